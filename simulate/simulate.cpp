@@ -19,6 +19,7 @@
 #include "formats/lattice/fused_points.h"
 #include "formats/lattice/quadratic_field.h"
 #include "simulate/conduction/conduction.h"
+#include "simulate/contact/pairs/stuck_places.h"
 #include "simulate/effects/contact.h"
 #include "simulate/equilibrium/equilibrium.h"
 #include "simulate/equilibrium/equilibrium_problem.h"
@@ -406,9 +407,6 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   const ThreadLimit limit(options.threads);
   refuse_empty(body);
   refuse_damaged_columns(body);
-  erase_stress_columns(body);
-  body.cell_columns.erase(kFreeStrainColumn);  // a run's own
-  progress.stage("simulate");
   if (!scene.run.time && !scene.events.empty()) {
     if (is_quadratic(scene, body))
       throw InputError(scene.name, "model \"quadratic\" has no [[event]]; use model \"cells\"");
@@ -417,6 +415,9 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
     after.events.clear();
     return simulate(body, after, options, progress);
   }
+  erase_stress_columns(body);
+  body.cell_columns.erase(kFreeStrainColumn);  // a run's own
+  progress.stage("simulate");
   drop_stuck_places(body, scene, progress);
   check_actions(scene, body, progress);
   refuse_heat(scene);

@@ -38,39 +38,20 @@ bool parse(std::string_view line, std::size_t elements, FusedPoint& point) {
          point.stiffness > 0 && std::isfinite(point.length) && point.length >= 0;
 }
 
-bool is_part(double number, const Body& body) {
-  return number >= 0 && number < static_cast<double>(body.parts.size()) && number == std::floor(number);
-}
-
-bool parse_places(std::string_view line, const Body& body, StuckPlaces& places) {
-  for (double& value : places)
-    if (!take(line, value, ' ') || !std::isfinite(value)) return false;
-  const double phase = places[18];
-  return line.empty() && is_part(places[0], body) && (places[7] == -1 || is_part(places[7], body)) &&
-         (phase == 0 || phase == 1 || phase == 2);
-}
-
-// Calls parse(line, number) for each line of a note; throws InputError where it returns false.
-template <class Parse>
-void for_each_line(const Body& body, const char* name, const Parse& parse) {
-  const auto note = body.notes.find(name);
-  if (note == body.notes.end()) return;
-  std::string_view text = note->second;
-  for (std::size_t number = 1; !text.empty(); ++number) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
-    if (!parse(text.substr(0, end)))
-      throw InputError(fmt::format("the body's note \"{}\" is damaged in line {}", name, number));
-    text.remove_prefix(std::min(end + 1, text.size()));
-  }
-}
-
 }  // namespace
 
 std::vector<FusedPoint> fused_points(const Body& body) {
   std::vector<FusedPoint> points;
-  for_each_line(body, kFusedNote, [&](std::string_view line) {
-    return parse(line, body.element_count(), points.emplace_back());
-  });
+  const auto note = body.notes.find(kFusedNote);
+  if (note == body.notes.end()) return points;
+  std::string_view text = note->second;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    if (!parse(text.substr(0, end), body.element_count(), points.emplace_back()))
+      throw InputError(
+          fmt::format("the body's note \"{}\" is damaged in line {}", kFusedNote, points.size()));
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
   return points;
 }
 
@@ -82,23 +63,6 @@ void set_fused_points(Body& body, const std::vector<FusedPoint>& points) {
     append_text(note, "{:.17g} {:.17g} ", point.stiffness, point.length);
     for (std::size_t i = 0; i < point.elements.size(); ++i)
       append_text(note, "{}:{:.17g} ", point.elements[i], point.weights[i]);
-    note += '\n';
-  }
-}
-
-std::vector<StuckPlaces> stuck_places(const Body& body) {
-  std::vector<StuckPlaces> all;
-  for_each_line(body, kStuckNote,
-                [&](std::string_view line) { return parse_places(line, body, all.emplace_back()); });
-  return all;
-}
-
-void set_stuck_places(Body& body, const std::vector<StuckPlaces>& places) {
-  body.notes.erase(kStuckNote);
-  if (places.empty()) return;
-  std::string& note = body.notes[kStuckNote];
-  for (const StuckPlaces& each : places) {
-    for (const double value : each) append_text(note, "{:.17g} ", value);
     note += '\n';
   }
 }

@@ -3,6 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <charconv>
+#include <map>
+#include <set>
+
 #include "base/error.h"
 #include "formats/lattice/body_moments.h"
 #include "formats/lattice/fused_points.h"
@@ -29,6 +34,27 @@ void append_all(std::vector<T>& all, const std::vector<T>& more) {
   all.insert(all.end(), more.begin(), more.end());
 }
 
+// Notes whose lines name parts by their numbers, at these places among what blanks separate.
+const std::map<std::string, std::set<std::size_t>> kNotesOfParts = {{"carved", {0}}, {"stuck", {0, 7}}};
+
+// `note`, with parts numbered from `first` on. What is no number of a part stays: -1, or what is damaged.
+std::string renumbered(const std::string& note, const std::set<std::size_t>& places, std::size_t first) {
+  std::string result;
+  std::size_t place = 0;
+  for (std::size_t at = 0; at < note.size();) {
+    const std::size_t end = std::min(note.find_first_of(" \n", at), note.size());
+    const std::string word = note.substr(at, end - at);
+    std::size_t part = 0;
+    const auto [rest, error] = std::from_chars(word.data(), word.data() + word.size(), part);
+    const bool number = error == std::errc() && rest == word.data() + word.size();
+    result += number && places.contains(place) ? std::to_string(part + first) : word;
+    if (end < note.size()) result += note[end];
+    place = end < note.size() && note[end] == '\n' ? 0 : place + 1;
+    at = end + 1;
+  }
+  return result;
+}
+
 void append_surface_cells(Body& body, const Body& other, std::uint32_t cells) {
   // Either may have none (centre placement): its polygons then bound no cell.
   body.surface_cell_offsets.resize(body.surface.polygon_count() + 1,
@@ -49,10 +75,6 @@ void append(Body& body, Body other) {
   std::vector<FusedPoint> fused = fused_points(body), others_fused = fused_points(other);
   for (FusedPoint& point : others_fused)
     for (std::uint32_t& e : point.elements) e += elements;
-  std::vector<StuckPlaces> stuck = stuck_places(body), others_stuck = stuck_places(other);
-  for (StuckPlaces& places : others_stuck)
-    for (const std::size_t part : {std::size_t{0}, std::size_t{7}})
-      if (places[part] >= 0) places[part] += static_cast<double>(parts);
   append_columns(body.element_columns, other.element_columns, "element");
   append_columns(body.cell_columns, other.cell_columns, "cell");
   for (Part part : other.parts) {
@@ -78,10 +100,10 @@ void append(Body& body, Body other) {
   append(body.surface, std::move(other.surface));
   for (std::size_t p = parts; p < body.parts.size(); ++p) body.parts[p].name = body.surface.parts[p].name;
   fused.insert(fused.end(), others_fused.begin(), others_fused.end());
+  for (const auto& [key, places] : kNotesOfParts)
+    if (other.notes.contains(key)) body.notes[key] += renumbered(other.notes[key], places, parts);
   for (const auto& [key, note] : other.notes) body.notes.try_emplace(key, note);
   set_fused_points(body, fused);
-  stuck.insert(stuck.end(), others_stuck.begin(), others_stuck.end());
-  set_stuck_places(body, stuck);
 }
 
 }  // namespace flexel

@@ -267,25 +267,6 @@ void Contacts::restore_from(const std::vector<double>& transfer_state) {
   memory_.restore_by_position(points(), settings_.planes.size(), values);
 }
 
-std::vector<StuckPlaces> Contacts::stuck_in(const std::vector<double>& transfer_state) {
-  std::vector<StuckPlaces> places;
-  if (transfer_state.empty()) return places;
-  std::span<const double> values(transfer_state);
-  values = values.subspan(1 + static_cast<std::size_t>(values[0]));
-  StuckPlaces each{};
-  for (; values.size() >= each.size(); values = values.subspan(each.size())) {
-    std::copy_n(values.begin(), each.size(), each.begin());
-    if (PairMemory::sticks(each)) places.push_back(each);
-  }
-  return places;
-}
-
-std::vector<double> Contacts::transfer_of(const std::vector<StuckPlaces>& places) {
-  std::vector<double> values{0};  // no part is known: all are looked at for overlap
-  for (const StuckPlaces& each : places) values.insert(values.end(), each.begin(), each.end());
-  return values;
-}
-
 std::vector<std::array<std::uint32_t, 2>> Contacts::touching(const State& state) {
   update(state);
   std::vector<std::array<std::uint32_t, 2>> result;

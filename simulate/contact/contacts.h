@@ -6,7 +6,6 @@
 // (ContactStepBound). Forces on elements are summed in the order of the pairs, so that the bits do not depend
 // on the number of threads. One object serves all the hooks of a run.
 #pragma once
-#include "formats/lattice/fused_points.h"
 #include "simulate/contact/contact_friction.h"
 #include "simulate/contact/contact_step_bound.h"
 #include "simulate/contact/implicit_contact.h"
@@ -59,10 +58,6 @@ class Contacts {
   // pairs by their positions at rest. Pairs that are not there any more are left out.
   [[nodiscard]] std::vector<double> transfer_state() const;
   void restore_from(const std::vector<double>& transfer_state);
-
-  // Of transfer_state(): what sticks, for the body file; and what restore_from() takes from one.
-  [[nodiscard]] static std::vector<StuckPlaces> stuck_in(const std::vector<double>& transfer_state);
-  [[nodiscard]] static std::vector<double> transfer_of(const std::vector<StuckPlaces>& places);
 
   // Throws InputError (simulate/contact/initial_overlap.h). Only before the first evaluation, and after an
   // event for the parts that have joined.

@@ -2,15 +2,10 @@
 // difference of the two lattice indices.
 #include "simulate/models/connections.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <cstdlib>
-
-#include "base/error.h"
-#include "simulate/models/rest_shape.h"
 
 namespace flexel::simulate {
 namespace {
@@ -111,33 +106,6 @@ ConnectionRows connection_rows(const Connections& connections, std::size_t eleme
   for (std::size_t c = 0; c < connections.size(); ++c)
     rows.entries[next[connections.a[c]]++] = {connections.b[c], connections.kind[c], 1};
   return rows;
-}
-
-std::vector<double> connection_factors(const Body& body, const ConnectionRows& rows,
-                                       const std::string& what) {
-  const std::vector<double> of_elements = element_factors(body, (what + "_change").c_str());
-  const std::string own = "connection_" + what + "_change";
-  const std::span<const double> of_connections = connection_values(body, own.c_str());
-  std::vector<double> factors;
-  if (of_elements.empty() && of_connections.empty()) return factors;
-  factors.assign(rows.entries.size(), 1);
-  for (std::uint32_t e = 0; e < body.element_count(); ++e)
-    for (std::size_t i = rows.offsets[e]; i < rows.offsets[e + 1]; ++i) {
-      const ConnectionRows::Entry& entry = rows.entries[i];
-      if (!of_elements.empty()) factors[i] = 0.5 * (of_elements[e] + of_elements[entry.other]);
-      if (of_connections.empty()) continue;
-      const std::uint32_t from = entry.sign > 0 ? e : entry.other;
-      const std::size_t bit = entry.kind - std::size_t{1};
-      const double change = of_connections[half_neighbourhood.size() * from + bit];
-      if (!(1 + change > 0))
-        throw InputError(
-            fmt::format("column \"{}\" of elements: connection {} of element {} has {:g}, a factor less 1: "
-                        "it needs to be "
-                        "above -1",
-                        own, bit, from, change));
-      factors[i] *= 1 + change;
-    }
-  return factors;
 }
 
 }  // namespace flexel::simulate

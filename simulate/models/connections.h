@@ -12,7 +12,6 @@
 #pragma once
 #include <cstdint>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "simulate/state/state.h"
@@ -71,12 +70,5 @@ struct ConnectionRows {
   }
 };
 [[nodiscard]] ConnectionRows connection_rows(const Connections& connections, std::size_t elements);
-
-// (entries of the rows) The factor on "stiffness", "damping", "strength" or "friction" of each connection: the mean of
-// its two elements' (column "WHAT_change" of elements; Jansson and Vergeest, section 3.2) times its own (column
-// "connection_WHAT_change", elements x 13, at the element that has the bit in Body::connections), both kept less 1.
-// Empty: 1 for all. Throws InputError: a column has another shape, or a factor is not above 0.
-[[nodiscard]] std::vector<double> connection_factors(const Body& body, const ConnectionRows& rows,
-                                                     const std::string& what);
 
 }  // namespace flexel::simulate

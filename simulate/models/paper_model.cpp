@@ -64,6 +64,33 @@ bool is_rigid_part(const Problem& problem, std::uint32_t part) {
 
 }  // namespace
 
+std::vector<double> connection_factors(const Body& body, const ConnectionRows& rows,
+                                       const std::string& what) {
+  const std::vector<double> of_elements = element_factors(body, (what + "_change").c_str());
+  const std::string own = "connection_" + what + "_change";
+  const std::span<const double> of_connections = connection_values(body, own.c_str());
+  std::vector<double> factors;
+  if (of_elements.empty() && of_connections.empty()) return factors;
+  factors.assign(rows.entries.size(), 1);
+  for (std::uint32_t e = 0; e < body.element_count(); ++e)
+    for (std::size_t i = rows.offsets[e]; i < rows.offsets[e + 1]; ++i) {
+      const ConnectionRows::Entry& entry = rows.entries[i];
+      if (!of_elements.empty()) factors[i] = 0.5 * (of_elements[e] + of_elements[entry.other]);
+      if (of_connections.empty()) continue;
+      const std::uint32_t from = entry.sign > 0 ? e : entry.other;
+      const std::size_t bit = entry.kind - std::size_t{1};
+      const double change = of_connections[half_neighbourhood.size() * from + bit];
+      if (!(1 + change > 0))
+        throw InputError(
+            fmt::format("column \"{}\" of elements: connection {} of element {} has {:g}, a factor less 1: "
+                        "it needs to be "
+                        "above -1",
+                        own, bit, from, change));
+      factors[i] *= 1 + change;
+    }
+  return factors;
+}
+
 PaperModel::PaperModel(const Problem& problem)
     : body_(problem.body),
       connections_(resisting_connections(problem)),

@@ -8,6 +8,8 @@
 //
 // Rigid parts have no connections here: they cost nothing and do not bound the step.
 #pragma once
+#include <string>
+
 #include "simulate/linear/block_matrix.h"
 #include "simulate/models/central_spring.h"
 #include "simulate/models/connections.h"
@@ -21,6 +23,13 @@ struct ConnectionMemory {
   std::vector<double> strain;        // (elements) equivalent plastic strain
   std::vector<std::uint8_t> broken;  // (entries of the rows) 1: it resists no more
 };
+
+// (entries of the rows) The factor on "stiffness", "damping", "strength" or "friction" of each connection: the mean of
+// its two elements' (column "WHAT_change" of elements; Jansson and Vergeest, section 3.2) times its own (column
+// "connection_WHAT_change", elements x 13, at the element that has the bit in Body::connections), both kept less 1.
+// Empty: 1 for all. Throws InputError: a column has another shape, or a factor is not above 0.
+[[nodiscard]] std::vector<double> connection_factors(const Body& body, const ConnectionRows& rows,
+                                                     const std::string& what);
 
 class PaperModel {
  public:

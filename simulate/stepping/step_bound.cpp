@@ -7,6 +7,7 @@
 
 #include "base/parallel.h"
 #include "simulate/models/damping_factors.h"
+#include "simulate/models/rest_shape.h"
 #include "simulate/models/stability.h"
 #include "simulate/stepping/staged_damping.h"
 

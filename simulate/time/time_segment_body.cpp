@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "simulate/contact/contacts.h"
+#include "simulate/contact/pairs/stuck_places.h"
 #include "simulate/effects/contact.h"
 #include "simulate/effects/rigid.h"
 
@@ -48,7 +48,7 @@ void TimeSegment::store(const State& state) {
 void TimeSegment::store_stuck() {
   body_.notes.erase(kStuckNote);
   for (const ActiveEffect& effect : effects_)
-    if (effect.name == Contact::name) set_stuck_places(body_, Contacts::stuck_in(effect->transfer_state()));
+    if (effect.name == Contact::name) set_stuck_places(body_, stuck_in(effect->transfer_state()));
 }
 
 void TimeSegment::unload() {

@@ -16,7 +16,7 @@
 #include "base/stop.h"
 #include "formats/lattice/body_file.h"
 #include "formats/lattice/fused_points.h"
-#include "simulate/contact/contacts.h"
+#include "simulate/contact/pairs/stuck_places.h"
 #include "simulate/effects/contact.h"
 #include "simulate/live/live_link.h"
 #include "simulate/models/damping_factors.h"
@@ -132,12 +132,12 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
 // With what stuck at the end of an earlier run.
 void TimedRun::begin() {
   const std::vector<StuckPlaces> stuck = stuck_places(body_);
-  if (!stuck.empty()) start_.transferred_states = {{Contact::name, Contacts::transfer_of(stuck)}};
+  if (!stuck.empty()) start_.transferred_states = {{Contact::name, transfer_of(stuck)}};
   segment_.emplace(body_, scene_, options_, progress_, start_, state_of(body_));
   start_.transferred_states.clear();
   std::size_t found = 0;
   for (const auto& [name, transferred] : segment_->transferred_states())
-    if (name == Contact::name) found = Contacts::stuck_in(transferred).size();
+    if (name == Contact::name) found = stuck_in(transferred).size();
   if (found < stuck.size())
     progress_.warn(
         fmt::format("{} of the {} places that stuck at the end of an earlier run are not there in "

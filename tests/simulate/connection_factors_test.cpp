@@ -171,31 +171,29 @@ TEST(ConnectionFactors, AnEditSetsThoseInsideOrAcross) {
   const auto edited = [&](const std::string& keys) {
     Body made = body;
     (void)testing::simulate_quietly(
-        made, gum_scene_of("[[fix]]\nwhere = \"xmin\"\n[[event]]\ndo = \"edit\"\n" + box + keys +
-                           "[[load]]\nwhere = "
-                           "\"xmax\"\nforce = [\"0.1 N\", 0, 0]\n"));
+        made, gum_scene_of("[run]\ntime = \"1 us\"\n[[event]]\nat = \"0 s\"\ndo = \"edit\"\n" + box + keys));
     return made;
   };
-  const auto stretches = [](const Body& of) {
-    std::array<double, 3> made{};
-    for (std::size_t i = 0; i < 3; ++i) made[i] = of.position[i + 1].x() - of.position[i].x() - kWide;
-    return made;
-  };
-  const double plain = 0.1 / (1e6 * kWide);  // F / k
-  for (const auto& [which, expected] :
-       {std::pair{"inside", std::array{0.5, 1.0, 1.0}}, {"across", {1, 0.5, 1}}}) {
-    const std::array<double, 3> found =
-        stretches(edited("connections = \"" + std::string(which) + "\"\nstiffness = 2\n"));
-    for (std::size_t i = 0; i < 3; ++i)
-      EXPECT_NEAR(found[i], expected[i] * plain, 1e-6 * plain) << which << i;
+  const double k = 1e6 * kWide;
+  for (const auto& [which, changed] : {std::pair{"inside", 0u}, {"across", 1u}}) {
+    const std::string connections = "connections = \"" + std::string(which) + "\"\n";
+    const Body stiff = edited(connections + "stiffness = 2\n"),
+               longer = edited(connections + "length = 1.1\n");
+    const PaperModel model(gum_problem(stiff)), stretched(gum_problem(longer));
+    for (std::uint32_t e = 0; e < 3; ++e) {
+      const ConnectionRows::Entry& entry = model.rows().of(e).back();
+      EXPECT_DOUBLE_EQ(model.stiffness(e, entry), e == changed ? 2 * k : k) << which << e;
+      const ConnectionRows::Entry& same = stretched.rows().of(e).back();
+      EXPECT_NEAR(stretched.stretched(testing::at_rest(body), e, same).elongation,
+                  e == changed ? -0.1 * kWide : 0, 1e-12 * kWide);
+    }
   }
-  const std::array<double, 3> longer = stretches(edited("connections = \"across\"\nlength = 1.1\n"));
-  EXPECT_NEAR(longer[1], plain + 0.1 * kWide, 1e-6 * plain);
-  EXPECT_NEAR(longer[0], plain, 1e-6 * plain);
-  EXPECT_EQ(edited("connections = \"across\"\nfriction = 3\nstrength = 2\n")
+  // factors multiply
+  const std::string twice = "connections = \"across\"\nstrength = 2\n";
+  EXPECT_EQ(edited(twice + "[[event]]\nat = \"0 s\"\ndo = \"edit\"\n" + box + twice)
                 .element_columns.at("connection_strength_change")
                 .values[kBits * 1],
-            1);
+            3);
   const auto refused = [&](const Body& of, const std::string& keys) {
     try {
       Body made = of;

@@ -1,10 +1,11 @@
 // What contact stuck together goes on in a later run, through the file.
+#include "simulate/contact/pairs/stuck_places.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/error.h"
 #include "formats/lattice/body_file.h"
-#include "formats/lattice/fused_points.h"
 #include "simulate/effects/damping.h"
 #include "simulate/effects/gravity.h"
 #include "tests/simulate/contact_case.h"

@@ -5,13 +5,10 @@
 #include <array>
 #include <map>
 
-#include "formats/lattice/fused_points.h"
-
 namespace flexel::simulate {
 namespace {
 
 constexpr std::size_t kPerPoint = 7, kPerRecord = 7;
-static_assert(std::tuple_size_v<StuckPlaces> == 2 * kPerPoint + kPerRecord);
 
 using PointName = std::array<double, kPerPoint>;
 

@@ -45,8 +45,6 @@ class PairMemory {
   // part, position and normal at rest, a plane by -1 and its number; a pair by both and its record. Pairs that
   // are not there any more are left out. Planes are numbered behind the points.
   void save_by_position(const std::vector<ContactPoint>& points, std::vector<double>& values) const;
-  // Whether the pair of such a row sticks.
-  [[nodiscard]] static bool sticks(std::span<const double> row) { return row[17] != PairRecord::kFree; }
   void restore_by_position(const std::vector<ContactPoint>& points, std::size_t planes,
                            std::span<const double> values);
 
