@@ -5,7 +5,8 @@
 
 #include "formats/lattice/body_file.h"
 #include "simulate/implicit/damping_matrix.h"
-#include "simulate/linear/vector_products.h"
+#include "simulate/linear/operator.h"
+#include "simulate/models/cells.h"
 #include "simulate/paper/connection_friction.h"
 #include "simulate/paper/connection_yield.h"
 #include "tests/scratch.h"

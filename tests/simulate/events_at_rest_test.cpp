@@ -45,16 +45,16 @@ Vec3 end_of(Body body, const std::string& events) {
   return body.position.back() - body.rest.back();
 }
 
-// Twice as stiff everywhere: half as far, at the small loads of this one.
+// Twice as stiff everywhere: half as far, but for the springs of the fix, which the edit leaves.
 TEST(EventsAtRest, AnEditActsBeforeTheLoad) {
   const Vec3 plain = end_of(resting_bar(), ""),
              edited = end_of(resting_bar(), "[[event]]\ndo = \"edit\"\nstiffness = 2\n");
-  EXPECT_NEAR(edited.z(), 0.5 * plain.z(), 1e-4 * std::abs(plain.z()));
+  EXPECT_NEAR(edited.z(), 0.5 * plain.z(), 1e-3 * std::abs(plain.z()));
   // in the order of the file: twice twice
   const Vec3 twice = end_of(resting_bar(),
                             "[[event]]\ndo = \"edit\"\nstiffness = 2\n[[event]]\ndo = "
                             "\"edit\"\nstiffness = 2\n");
-  EXPECT_NEAR(twice.z(), 0.25 * plain.z(), 1e-4 * std::abs(plain.z()));
+  EXPECT_NEAR(twice.z(), 0.25 * plain.z(), 2e-3 * std::abs(plain.z()));
 }
 
 // As a timed run with the event at its start leaves the body, so equilibrium has it.
@@ -120,7 +120,7 @@ TEST(EventsAtRest, TheyComeBeforeARunThatSettlesToo) {
   const auto sag = [](const std::string& event) {
     Body body = resting_bar();
     (void)simulate_quietly(
-        body, rest_scene("contact = true\n[[fix]]\nwhere = \"x0\"\n[gravity]\nacceleration = [0, 0, "
+        body, rest_scene("[contact]\nself = true\n[[fix]]\nwhere = \"x0\"\n[gravity]\nacceleration = [0, 0, "
                          "\"-1 m/s2\"]\n" +
                          event));
     return (body.position.back() - body.rest.back()).z();
