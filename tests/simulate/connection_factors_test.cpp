@@ -244,10 +244,11 @@ TEST(ConnectionFactors, TheStepHeedsTheDampingOfOneConnection) {
   Body body = lattice_of({4, 2, 2});
   set_connections(body, "connection_damping_change",
                   [](std::size_t e, std::size_t bit) { return e == 5 && bit == 0 ? 300.0 : 0.0; });
-  const TimedCase made = testing::run_timed(
-      body,
-      gum_scene_of("[damping]\ntime = \"20 us\"\n[[velocity]]\nwhere = \"xmin\"\nvelocity = [\"0.1 m/s\", "
-                   "0, 0]\n[run]\ntime = \"10 ms\"\n"));
+  const TimedCase made =
+      testing::run_timed(body, gum_scene_of("[damping]\ntime = \"20 us\"\n[[velocity]]\nwhere = { box = { "
+                                            "min = [\"-1 mm\", \"-1 mm\", \"-1 mm\"], "
+                                            "max = [\"20 mm\", \"21 mm\", \"21 mm\"] } }\nvelocity = [\"0.1 "
+                                            "m/s\", 0, 0]\n[run]\ntime = \"10 ms\"\n"));
   testing::expect_books_close(made.result);
   const double kinetic = made.history.column("kinetic").back();
   EXPECT_LT(kinetic, made.history.column("kinetic").front() * 1.001);
@@ -298,7 +299,10 @@ TEST(ConnectionFactors, DampedImplicitStepsConvergeToExplicitOnes) {
   Body still = body;
   (void)testing::simulate_quietly(still, scene(""));
   const Vec3 sag = still.position.back() - still.rest.back();
-  EXPECT_LT((way("time = \"2 s\"\nstep = \"20 ms\"\n" + implicit) - sag).norm(), 1e-3 * sag.norm());
+  // in time a fix whose surface cuts through the lattice is softer (docs/reference/motion.md)
+  const Vec3 rested = way("time = \"2 s\"\nstep = \"20 ms\"\n" + implicit);
+  EXPECT_LT((rested - sag).norm(), 1e-2 * sag.norm());
+  EXPECT_LT((way("time = \"2 s\"\nstep = \"5 ms\"\n" + implicit) - rested).norm(), 1e-6 * sag.norm());
 }
 
 }  // namespace
