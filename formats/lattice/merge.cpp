@@ -38,7 +38,7 @@ void append_all(std::vector<T>& all, const std::vector<T>& more) {
 const std::map<std::string, std::set<std::size_t>> kNotesOfParts = {{"carved", {0}}, {"stuck", {0, 7}}};
 
 // `note`, with parts numbered from `first` on. What is no number of a part stays: -1, or what is damaged.
-std::string renumbered(const std::string& note, const std::set<std::size_t>& places, std::size_t first) {
+std::string with_parts_from(const std::string& note, const std::set<std::size_t>& places, std::size_t first) {
   std::string result;
   std::size_t place = 0;
   for (std::size_t at = 0; at < note.size();) {
@@ -101,7 +101,7 @@ void append(Body& body, Body other) {
   for (std::size_t p = parts; p < body.parts.size(); ++p) body.parts[p].name = body.surface.parts[p].name;
   fused.insert(fused.end(), others_fused.begin(), others_fused.end());
   for (const auto& [key, places] : kNotesOfParts)
-    if (other.notes.contains(key)) body.notes[key] += renumbered(other.notes[key], places, parts);
+    if (other.notes.contains(key)) body.notes[key] += with_parts_from(other.notes[key], places, parts);
   for (const auto& [key, note] : other.notes) body.notes.try_emplace(key, note);
   set_fused_points(body, fused);
 }
