@@ -16,8 +16,11 @@
 #include "base/stop.h"
 #include "base/units.h"
 #include "formats/lattice/body_file.h"
+#include "formats/lattice/fused_points.h"
 #include "formats/lattice/quadratic_field.h"
 #include "simulate/conduction/conduction.h"
+#include "simulate/contact/pairs/stuck_places.h"
+#include "simulate/effects/contact.h"
 #include "simulate/equilibrium/equilibrium.h"
 #include "simulate/equilibrium/equilibrium_problem.h"
 #include "simulate/equilibrium/positive_tangent.h"
@@ -40,6 +43,7 @@
 #include "simulate/thermal/temperature_column.h"
 #include "simulate/thermal/thermal.h"
 #include "simulate/time/dynamic_relaxation.h"
+#include "simulate/time/time_segment.h"
 #include "simulate/time/timed_run.h"
 
 namespace flexel::simulate {
@@ -350,6 +354,38 @@ SimulateResult run_and_judge(Body& body, const Scene& scene, const SimulateOptio
   return result;
 }
 
+// Only contact in runs in time, or that settle, goes on with them.
+void drop_stuck_places(Body& body, const Scene& scene, Progress& progress) {
+  if (scene.get<Contact>().on && (scene.run.time || settles(scene))) return;
+  if (const std::size_t count = stuck_places(body).size(); count > 0)
+    progress.warn(
+        fmt::format("{}: {} places of surfaces stuck together at the end of an earlier run; without "
+                    "[contact] they are apart",
+                    scene.name, count));
+  body.notes.erase(kStuckNote);
+}
+
+// The events of a scene without a time change the body as it comes, one after the other, before anything acts.
+void happen_before_equilibrium(Body& body, Scene scene, Progress& progress) {
+  for (const Event& event : scene.events)
+    if (event.prepare)
+      for (std::string& name : event.prepare()) scene.coming_parts.push_back(std::move(name));
+  State state = state_of(body);
+  SegmentStart start;
+  start.settled = settled_displacement(body);
+  start.fused = fused_points(body);
+  body.notes.erase(kFusedNote);  // events change start.fused and the numbers of elements
+  for (const Event& event : scene.events) {
+    const Problem problem = timed_problem(body, scene, start);
+    EventContext context{body, state, start.fused, start.settled, problem, progress};
+    const std::string what = event.apply(context);
+    progress.say(fmt::format("{}: {}", event.name, what));
+  }
+  set_fused_points(body, start.fused);
+  body.position.resize(body.element_count());
+  move_body(body, state);
+}
+
 void explain_memory(const Body& body, const Scene& scene, Progress& progress) {
   const std::optional<MemoryNeeded> needed = memory_needed(body, scene);
   if (!needed) return;
@@ -370,9 +406,19 @@ double parse_timeout(const std::string& text, const std::string& option) {
 SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress) {
   const ThreadLimit limit(options.threads);
   refuse_empty(body);
+  refuse_damaged_columns(body);
+  if (!scene.run.time && !scene.events.empty()) {
+    if (is_quadratic(scene, body))
+      throw InputError(scene.name, "model \"quadratic\" has no [[event]]; use model \"cells\"");
+    happen_before_equilibrium(body, scene, progress);
+    Scene after = scene;
+    after.events.clear();
+    return simulate(body, after, options, progress);
+  }
   erase_stress_columns(body);
   body.cell_columns.erase(kFreeStrainColumn);  // a run's own
   progress.stage("simulate");
+  drop_stuck_places(body, scene, progress);
   check_actions(scene, body, progress);
   refuse_heat(scene);
   refuse_beyond_memory(body, scene);

@@ -1,17 +1,21 @@
 #!/usr/bin/python3
-"""Runs the commands of a page, block by block in one folder, and writes what each prints into the ```text block that follows it.
+"""Runs the commands of a page, block by block in one folder; writes what each prints into the ```text block that follows it, and the pictures
+that the page shows of what they draw.
 
-    PATH=build/release/bin:$PATH bench/paper/page.py [PAGE.md ...]      (docs/guide/paper.md, samples/kneaded/README.md)
+    PATH=build/release/bin:$PATH bench/paper/page.py [PAGE.md ...]      (docs/guide/paper.md and the pages of the samples)
 """
 
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
-PAGES = [SOURCE / "docs/guide/paper.md", SOURCE / "samples/kneaded/README.md"]
+SAMPLES = ["bracket", "cantilever", "carved", "dented", "fork", "frozen", "gripped", "kneaded", "squeezed", "supports", "swing", "torn"]
+PAGES = [SOURCE / "docs/guide/paper.md"] + [SOURCE / f"samples/{name}/README.md" for name in SAMPLES]
+PICTURE = re.compile(r"!\[[^]]*\]\((?:[^)]*/)?([^/)]+\.png)\)")
 BLOCK = re.compile(r"^```sh\n(.*?)^```\n(?:\n```text\n(.*?)^```\n)?", re.M | re.S)
 
 
@@ -33,6 +37,11 @@ def run_blocks(commands, folder):
     return printed
 
 
+def pictures(text):
+    """Names of those that the page shows."""
+    return PICTURE.findall(text)
+
+
 def write(page):
     text = page.read_text(encoding="utf-8")
     with tempfile.TemporaryDirectory(prefix="flexel-") as folder:
@@ -40,6 +49,8 @@ def write(page):
             printed = iter(run_blocks([commands for commands, _ in blocks(text)], pathlib.Path(folder)))
         except RuntimeError as error:
             sys.exit(f"page.py: {page}: {error}")
+        for name in pictures(text):
+            shutil.copyfile(pathlib.Path(folder) / name, SOURCE / "docs/pictures" / name)
 
     def written(match):
         said = next(printed)

@@ -42,7 +42,8 @@ void refuse_unled(const simulate::Scene& scene) {
   const auto refuse = [&](const char* what) {
     throw InputError(scene.name, std::string(what) + ": hands lead parts at equilibrium, without contact");
   };
-  if (scene.run.time || !scene.events.empty()) refuse("a run in time");
+  if (scene.run.time) refuse("a run in time");
+  if (!scene.events.empty()) refuse("[[event]]");
   if (scene.run.modes) refuse("[run] modes");
   if (scene.run.buckling) refuse("[run] buckling");
   if (scene.run.renormalise)

@@ -3,6 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <charconv>
+#include <map>
+#include <set>
+
 #include "base/error.h"
 #include "formats/lattice/body_moments.h"
 #include "formats/lattice/fused_points.h"
@@ -27,6 +32,27 @@ void append_columns(std::map<std::string, Column>& columns, std::map<std::string
 template <class T>
 void append_all(std::vector<T>& all, const std::vector<T>& more) {
   all.insert(all.end(), more.begin(), more.end());
+}
+
+// Notes whose lines name parts by their numbers, at these places among what blanks separate.
+const std::map<std::string, std::set<std::size_t>> kNotesOfParts = {{"carved", {0}}, {"stuck", {0, 7}}};
+
+// `note`, with parts numbered from `first` on. What is no number of a part stays: -1, or what is damaged.
+std::string with_parts_from(const std::string& note, const std::set<std::size_t>& places, std::size_t first) {
+  std::string result;
+  std::size_t place = 0;
+  for (std::size_t at = 0; at < note.size();) {
+    const std::size_t end = std::min(note.find_first_of(" \n", at), note.size());
+    const std::string word = note.substr(at, end - at);
+    std::size_t part = 0;
+    const auto [rest, error] = std::from_chars(word.data(), word.data() + word.size(), part);
+    const bool number = error == std::errc() && rest == word.data() + word.size();
+    result += number && places.contains(place) ? std::to_string(part + first) : word;
+    if (end < note.size()) result += note[end];
+    place = end < note.size() && note[end] == '\n' ? 0 : place + 1;
+    at = end + 1;
+  }
+  return result;
 }
 
 void append_surface_cells(Body& body, const Body& other, std::uint32_t cells) {
@@ -74,6 +100,8 @@ void append(Body& body, Body other) {
   append(body.surface, std::move(other.surface));
   for (std::size_t p = parts; p < body.parts.size(); ++p) body.parts[p].name = body.surface.parts[p].name;
   fused.insert(fused.end(), others_fused.begin(), others_fused.end());
+  for (const auto& [key, places] : kNotesOfParts)
+    if (other.notes.contains(key)) body.notes[key] += with_parts_from(other.notes[key], places, parts);
   for (const auto& [key, note] : other.notes) body.notes.try_emplace(key, note);
   set_fused_points(body, fused);
 }

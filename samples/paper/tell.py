@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """tell.py FILE WHAT...: figures of a run. Of books (CSV): the last value of a column, named without its unit. Of a summary or report (JSON): the
-displacement of a probe along an axis ("end x"), or a number by its keys ("timed.steps"). tell.py FILE alone, of `flexel measure --json`: Young's
+displacement of a probe along an axis ("end x"), a natural frequency ("mode 1"), or a number by its keys ("timed.steps"). tell.py FILE alone, of `flexel measure --json`: Young's
 modulus, Poisson's ratio and the shear modulus by direction, moduli over those of the material."""
 
 import csv
@@ -20,6 +20,8 @@ def of_summary(summary, prefix=""):
             values.update(of_summary(value, f"{prefix}{name}."))
         elif isinstance(value, (int, float)):
             values[prefix + name] = (value, "")
+    for number, mode in enumerate(summary.get("modes", []), 1):
+        values[f"mode {number}"] = (mode["frequency"], "Hz")
     for probe in summary.get("probes", []):
         values.update({f"{probe['name']} {axis}": (1e3 * u, "mm") for axis, u in zip("xyz", probe["displacement"])})
     return values

@@ -123,6 +123,23 @@ ContactPlane parse_plane(TableReader& reader, std::size_t number) {
   return plane;
 }
 
+// With the friction of the library's materials as that of the scene's. Throws InputError: one that touches has none.
+Problem with_library_friction(const Contact::Parameters& parameters, const std::vector<std::uint8_t>& touches,
+                              Problem problem) {
+  for (std::size_t p = 0; p < problem.materials.size(); ++p) {
+    Material& material = problem.materials[p];
+    if (!touches[p] || material.contact_friction) continue;
+    if (!(material.friction > 0))
+      throw InputError(
+          parameters.origin,
+          fmt::format("\"friction\" = \"material\": {} of part \"{}\" has none: write friction = 0.3 in "
+                      "[materials.NAME], or a number here",
+                      material.name, problem.body.parts[p].name));
+    material.contact_friction = material.friction;
+  }
+  return problem;
+}
+
 std::vector<std::uint8_t> chosen_parts(const Contact::Parameters& parameters, const Body& body) {
   if (!parameters.parts) return std::vector<std::uint8_t>(body.parts.size(), 1);
   std::vector<std::uint8_t> chosen(body.parts.size(), 0);
@@ -160,7 +177,10 @@ void Contact::parse(TableReader& scene, Parameters& parameters) {
   parameters.self = flag(reader, "self", true);
   parameters.stiffness = at_least_0(reader, "stiffness", 1);
   if (!(parameters.stiffness > 0)) reader.fail("\"stiffness\" in [contact] needs to be above 0");
-  parameters.friction = at_least_0(reader, "friction", 0);
+  const SceneValue* friction = reader.find("friction");
+  parameters.friction_of_materials =
+      friction && friction->kind == SceneValue::Kind::string && friction->text == "material";
+  if (!parameters.friction_of_materials) parameters.friction = at_least_0(reader, "friction", 0);
   parameters.stick = parse_stick(reader);
   parameters.damping = reader.quantity("damping", Dimension::time).value_or(0);
   if (!(parameters.damping >= 0)) reader.fail("\"damping\" in [contact] needs to be 0 or more");
@@ -188,7 +208,10 @@ std::optional<Contact> Contact::make(const Parameters& parameters, const Problem
     settings.stick.push_back(stick_of(parameters, problem.body, p, problem.materials[p]));
   settings.planes = parameters.planes;
   Contact made;
-  made.contacts_ = std::make_shared<Contacts>(std::move(settings), problem);
+  const std::vector<std::uint8_t> touches = settings.parts;
+  made.contacts_ = std::make_shared<Contacts>(
+      std::move(settings),
+      parameters.friction_of_materials ? with_library_friction(parameters, touches, problem) : problem);
   for (const Part& part : problem.body.parts) made.names_.push_back(part.name);
   return made;
 }

@@ -40,6 +40,7 @@ class Contact : public Effect {
     bool self = true;
     double stiffness = 1;
     double friction = 0;
+    bool friction_of_materials = false;              // where a scene's material gives none, the library's
     double stick = 0;                                // Pa, of materials that give none
     std::map<std::string, double> sticky;            // Pa, by material
     double damping = 0;                              // s

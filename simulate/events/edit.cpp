@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/files/append_text.h"
 #include "formats/part/column.h"
+#include "simulate/models/connections.h"
 
 namespace flexel::simulate {
 namespace {
@@ -42,11 +43,33 @@ void add_stick(Body& body, const std::vector<std::uint8_t>& chosen, double more)
     if (chosen[e]) column.values[e] += more;
 }
 
+constexpr std::size_t kConnectionsOfElement = half_neighbourhood.size();
+
+// A column of connections, 0 where it has not been.
+Column& connection_column(Body& body, const char* name) {
+  Column& column = body.element_columns[name];
+  if (column.values.empty())
+    column = {static_cast<int>(kConnectionsOfElement),
+              std::vector<double>(kConnectionsOfElement * body.element_count(), 0)};
+  return column;
+}
+
 }  // namespace
+
+bool Edit::changes_elements_only() const {
+  return density_ != 1 || yield_ != 1 || radius_ != 1 || stick_ != 0;
+}
 
 Edit Edit::parse(TableReader& reader) {
   Edit made;
   made.region_ = parse_region(reader);
+  if (const std::optional<std::string> of = reader.text("connections")) {
+    if (*of != "inside" && *of != "across")
+      reader.fail(reader.find("connections")->line,
+                  fmt::format("\"connections\" = \"{}\"; choose \"inside\" or \"across\"", *of));
+    made.of_ = *of == "inside" ? Of::connections_inside : Of::connections_across;
+  }
+  made.length_ = factor(reader, "length");
   made.stiffness_ = factor(reader, "stiffness");
   made.damping_ = factor(reader, "damping");
   made.density_ = factor(reader, "density");
@@ -56,16 +79,62 @@ Edit Edit::parse(TableReader& reader) {
   made.radius_ = factor(reader, "radius");
   made.stick_ = reader.quantity("stick", Dimension::pressure).value_or(0);
   made.origin_ = reader.place();
-  if (made.stiffness_ == 1 && made.damping_ == 1 && made.density_ == 1 && made.strength_ == 1 &&
-      made.yield_ == 1 && made.friction_ == 1 && made.radius_ == 1 && made.stick_ == 0)
+  if (made.of_ == Of::elements && made.length_ != 1)
+    reader.fail("\"length\" is that of connections: give \"connections\" = \"inside\" or \"across\" too");
+  if (made.of_ != Of::elements && made.changes_elements_only())
+    reader.fail(
+        "connections have no density, yield, radius or stick of their own: leave \"connections\" out for "
+        "these");
+  if (made.length_ == 1 && made.stiffness_ == 1 && made.damping_ == 1 && made.density_ == 1 &&
+      made.strength_ == 1 && made.yield_ == 1 && made.friction_ == 1 && made.radius_ == 1 && made.stick_ == 0)
     reader.fail(
         "edit needs \"stiffness\", \"damping\", \"density\", \"strength\", \"yield\", \"friction\" or "
         "\"radius\", factors on what there is, for example stiffness = 2, or \"stick\", a traction more");
   return made;
 }
 
+// With both ends in the region, or with one.
+std::string Edit::edit_connections(EventContext& context, const Chosen& chosen) const {
+  const Connections connections = make_connections(context.problem);
+  std::vector<std::size_t> edited;
+  for (std::size_t c = 0; c < connections.size(); ++c) {
+    const int inside = chosen.elements[connections.a[c]] + chosen.elements[connections.b[c]];
+    if (inside == (of_ == Of::connections_inside ? 2 : 1)) edited.push_back(c);
+  }
+  if (edited.empty())
+    throw InputError(origin_, fmt::format("edit: no connection of model \"paper\" is {} {}",
+                                          of_ == Of::connections_inside ? "inside" : "across the border of",
+                                          describe(region_)));
+  const auto place = [&](std::size_t c) {
+    return kConnectionsOfElement * connections.a[c] + connections.kind[c] - std::size_t{1};
+  };
+  std::string factors;
+  for (const auto& [called, column, by] : {std::tuple{"stiffness", "connection_stiffness_change", stiffness_},
+                                           {"damping", "connection_damping_change", damping_},
+                                           {"strength", "connection_strength_change", strength_},
+                                           {"friction", "connection_friction_change", friction_}}) {
+    if (by == 1) continue;
+    std::vector<double>& values = connection_column(context.body, column).values;
+    for (const std::size_t c : edited) values[place(c)] = (1 + values[place(c)]) * by - 1;
+    append_text(factors, ", {} times {}", called, by);
+  }
+  if (length_ != 1) {
+    const std::vector<std::uint32_t> part = element_parts(context.body);
+    std::vector<double>& values = connection_column(context.body, "connection_rest").values;
+    for (const std::size_t c : edited) {
+      const double lattice = connections.parts[part[connections.a[c]]].kinds[connections.kind[c]].length;
+      values[place(c)] = length_ * (lattice + values[place(c)]) - lattice;
+    }
+    append_text(factors, ", length times {}", length_);
+  }
+  return fmt::format("{} connections {} {}:{}", edited.size(),
+                     of_ == Of::connections_inside ? "inside" : "across the border of", describe(region_),
+                     factors.substr(1));
+}
+
 std::string Edit::apply(EventContext& context) const {
   const Chosen chosen = choose(region_, context.body, context.state);
+  if (of_ != Of::elements) return edit_connections(context, chosen);
   std::vector<std::uint8_t> elements = chosen.elements;
   for (const Part& part : context.body.parts)
     if (part.placement == Placement::corner)

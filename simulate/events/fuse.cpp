@@ -15,6 +15,7 @@
 #include "base/units.h"
 #include "simulate/models/cells.h"
 #include "simulate/models/central_spring.h"
+#include "simulate/models/rest_shape.h"
 #include "simulate/models/set_rest_shape.h"
 
 namespace flexel::simulate {
@@ -111,7 +112,7 @@ double stiffness_between(const Problem& problem, std::uint32_t a, std::uint32_t 
 }
 
 // Elements at the centres of voxels: a connection for every two of different parts that are near, its length what it is
-// now, k = E l with the mean of both E (Jansson and Vergeest, section 3.2 and equation 22).
+// now, k = E l with the mean of both E, edits' factors among them (Jansson and Vergeest, section 3.2 and equation 22).
 std::size_t connect_elements(EventContext& context, const Chosen& chosen, const std::vector<Vec3>& now,
                              double within) {
   const Body& body = context.body;
@@ -136,10 +137,13 @@ std::size_t connect_elements(EventContext& context, const Chosen& chosen, const 
           pairs.emplace_back(a, b);
     }
   std::sort(pairs.begin(), pairs.end());
+  const std::vector<double> factors = element_factors(body, "stiffness_change");
+  const auto young_of = [&](std::uint32_t e) {
+    return context.problem.materials[part[e]].young * (factors.empty() ? 1 : factors[e]);
+  };
   for (const auto& [a, b] : pairs) {
     const double length = (now[b] - now[a]).norm();
-    const auto& materials = context.problem.materials;
-    const double young = 0.5 * (materials[part[a]].young + materials[part[b]].young);
+    const double young = 0.5 * (young_of(a) + young_of(b));
     if (length > 0) context.fused.push_back({{a, b}, {1, -1}, young * length, length});
   }
   return pairs.size();

@@ -76,8 +76,9 @@ std::array<Mat3, 8> damping_row(const SpringKind& kind, const CellVectors& u, st
 
 }  // namespace
 
-void set_damping(const Problem& problem, const Stencil& stencil, const std::vector<double>& damping,
-                 const std::vector<Vec3>& displacement, BlockMatrix& matrix) {
+void set_damping(const Problem& problem, const Stencil& stencil, const PaperModel& paper,
+                 const std::vector<double>& damping, const std::vector<Vec3>& displacement,
+                 BlockMatrix& matrix) {
   const Body& body = problem.body;
   const std::vector<std::uint32_t> part = element_parts(body);
   std::vector<double> share = stiffness_shares(body);
@@ -104,6 +105,7 @@ void set_damping(const Problem& problem, const Stencil& stencil, const std::vect
       for (std::size_t b = 0; b < 8; ++b) row[stencil.slot[at.cell][8 * at.corner + b]] += scale * blocks[b];
     }
   });
+  paper.add_damping_matrix({displacement}, damping, matrix);
 }
 
 }  // namespace flexel::simulate

@@ -265,7 +265,9 @@ bool ImplicitEuler::attempt(State& state, const std::function<void(const std::st
                             ImplicitStep& told) {
   const double step = step_;
   before_ = state;
-  if (damped_) set_damping(problem_, mechanics_->stencil(), tau_, before_.displacement, damping_matrix_);
+  if (damped_)
+    set_damping(problem_, mechanics_->stencil(), mechanics_->paper(), tau_, before_.displacement,
+                damping_matrix_);
   State start = aimed_;
   start.displacement = state.displacement;
   for (const ActiveEffect& effect : effects_) effect->lead_to(*aimed_.time, start.displacement);

@@ -3,15 +3,17 @@
 // its ends; both give the same numbers with opposite signs, so that momentum is kept exactly.
 #include "simulate/models/paper_model.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <limits>
 
+#include "base/error.h"
 #include "base/math/greatest.h"
 #include "base/parallel.h"
 #include "simulate/models/central_spring.h"
-#include "simulate/models/damping_factors.h"
 #include "simulate/models/rest_shape.h"
 
 namespace flexel::simulate {
@@ -62,6 +64,33 @@ bool is_rigid_part(const Problem& problem, std::uint32_t part) {
 
 }  // namespace
 
+std::vector<double> connection_factors(const Body& body, const ConnectionRows& rows,
+                                       const std::string& what) {
+  const std::vector<double> of_elements = element_factors(body, (what + "_change").c_str());
+  const std::string own = "connection_" + what + "_change";
+  const std::span<const double> of_connections = connection_values(body, own.c_str());
+  std::vector<double> factors;
+  if (of_elements.empty() && of_connections.empty()) return factors;
+  factors.assign(rows.entries.size(), 1);
+  for (std::uint32_t e = 0; e < body.element_count(); ++e)
+    for (std::size_t i = rows.offsets[e]; i < rows.offsets[e + 1]; ++i) {
+      const ConnectionRows::Entry& entry = rows.entries[i];
+      if (!of_elements.empty()) factors[i] = 0.5 * (of_elements[e] + of_elements[entry.other]);
+      if (of_connections.empty()) continue;
+      const std::uint32_t from = entry.sign > 0 ? e : entry.other;
+      const std::size_t bit = entry.kind - std::size_t{1};
+      const double change = of_connections[half_neighbourhood.size() * from + bit];
+      if (!(1 + change > 0))
+        throw InputError(
+            fmt::format("column \"{}\" of elements: connection {} of element {} has {:g}, a factor less 1: "
+                        "it needs to be "
+                        "above -1",
+                        own, bit, from, change));
+      factors[i] *= 1 + change;
+    }
+  return factors;
+}
+
 PaperModel::PaperModel(const Problem& problem)
     : body_(problem.body),
       connections_(resisting_connections(problem)),
@@ -71,19 +100,22 @@ PaperModel::PaperModel(const Problem& problem)
   for (std::size_t e = 0; e < active_.size(); ++e)
     active_[e] = body_.parts[part_[e]].placement == Placement::centre && !is_rigid_part(problem, part_[e]) &&
                  !(e < problem.stray_element.size() && problem.stray_element[e]);
-  const std::size_t entries = rows_.entries.size();
+  factor_ = connection_factors(body_, rows_, "stiffness");
+  damping_factor_ = connection_factors(body_, rows_, "damping");
   const RestShapes shapes(body_);
-  const std::vector<double> factors = stiffness_factors(body_);
-  if (shapes.any()) memory_.flowed.assign(entries, 0);
-  if (!factors.empty()) factor_.assign(entries, 1);
-  if (memory_.flowed.empty() && factor_.empty()) return;
+  if (!shapes.any()) return;
+  memory_.flowed.assign(rows_.entries.size(), 0);
   for (std::uint32_t e = 0; e < active_.size(); ++e)
-    for (std::size_t i = rows_.offsets[e]; i < rows_.offsets[e + 1]; ++i) {
-      const ConnectionRows::Entry& entry = rows_.entries[i];
+    for (const ConnectionRows::Entry& entry : rows_.of(e)) {
       const std::uint32_t from = entry.sign > 0 ? e : entry.other;
-      if (!memory_.flowed.empty())
-        memory_.flowed[i] = shapes.of_connection(from, entry.kind - std::size_t{1});
-      if (!factor_.empty()) factor_[i] = 0.5 * (factors[e] + factors[entry.other]);
+      const std::size_t bit = entry.kind - std::size_t{1};
+      const double flowed = shapes.of_connection(from, bit), length = kind(e, entry.kind).length;
+      if (!(length + flowed > 0))
+        throw InputError(fmt::format(
+            "column \"connection_rest\" of elements: connection {} of element {} has {:g} m, which leaves "
+            "nothing of its length of {:g} m",
+            bit, from, flowed, length));
+      memory_.flowed[place(entry)] = flowed;
     }
 }
 
@@ -154,7 +186,6 @@ void PaperModel::add_forces(const State& state, std::vector<Vec3>& forces) const
 
 void PaperModel::add_damping(const State& state, const std::vector<double>& damping,
                              std::vector<Vec3>& forces) const {
-  const std::vector<double> factor = element_damping_factors(body_);
   parallel_for_each(
       rows_.offsets.size() - 1,
       [&](std::size_t e) {
@@ -162,14 +193,34 @@ void PaperModel::add_damping(const State& state, const std::vector<double>& damp
         if (damping[part_[e]] == 0) return;
         for (const ConnectionRows::Entry& entry : rows_.of(element)) {
           if (is_broken(entry)) continue;
-          const double change = factor.empty() ? 1 : 0.5 * (factor[e] + factor[entry.other]);
           const ConnectionKind& connection = kind(element, entry.kind);
           const Vec3 direction =
               (entry.sign * connection.rest + (state.displacement[entry.other] - state.displacement[e]))
                   .normalized();
           const double rate = direction.dot(state.velocity[entry.other] - state.velocity[e]);
-          forces[e] += (damping[part_[e]] * change * stiffness(element, entry) * rate) * direction;
+          forces[e] +=
+              (damping[part_[e]] * damping_factor(entry) * stiffness(element, entry) * rate) * direction;
         }
+      },
+      kPaperGrain);
+}
+
+void PaperModel::add_damping_matrix(const State& state, const std::vector<double>& damping,
+                                    BlockMatrix& matrix) const {
+  parallel_for_each(
+      rows_.offsets.size() - 1,
+      [&](std::size_t e) {
+        const auto element = static_cast<std::uint32_t>(e);
+        if (damping[part_[e]] == 0 || rows_.of(element).empty()) return;
+        Block own = Block::Zero();
+        for (const ConnectionRows::Entry& entry : rows_.of(element)) {
+          const Vec3 along = stretched(state, element, entry).direction;
+          const Block block = (damping[part_[e]] * damping_factor(entry) * stiffness(element, entry)) *
+                              along * along.transpose();
+          own += block;
+          matrix.values[position_of(matrix, e, entry.other)] -= block;
+        }
+        matrix.values[diagonal_position(matrix, e)] += own;
       },
       kPaperGrain);
 }

@@ -8,6 +8,8 @@
 //
 // Rigid parts have no connections here: they cost nothing and do not bound the step.
 #pragma once
+#include <string>
+
 #include "simulate/linear/block_matrix.h"
 #include "simulate/models/central_spring.h"
 #include "simulate/models/connections.h"
@@ -22,9 +24,16 @@ struct ConnectionMemory {
   std::vector<std::uint8_t> broken;  // (entries of the rows) 1: it resists no more
 };
 
+// (entries of the rows) The factor on "stiffness", "damping", "strength" or "friction" of each connection: the mean of
+// its two elements' (column "WHAT_change" of elements; Jansson and Vergeest, section 3.2) times its own (column
+// "connection_WHAT_change", elements x 13, at the element that has the bit in Body::connections), both kept less 1.
+// Empty: 1 for all. Throws InputError: a column has another shape, or a factor is not above 0.
+[[nodiscard]] std::vector<double> connection_factors(const Body& body, const ConnectionRows& rows,
+                                                     const std::string& what);
+
 class PaperModel {
  public:
-  // Keeps a reference to the problem's body.
+  // Keeps a reference to the problem's body. Throws InputError: a column of connections is damaged.
   explicit PaperModel(const Problem& problem);
 
   [[nodiscard]] const ConnectionRows& rows() const { return rows_; }
@@ -43,6 +52,8 @@ class PaperModel {
   // of a swing is sum_c 1/2 (u_a - u_b) k_c (u_a - u_b) <= sum_e u_e B_e u_e, hence omega^2 <= 2 max eig(B_e)
   // / m_e. `mass` (elements) [kg].
   [[nodiscard]] std::vector<double> frequencies(const State& state, const std::vector<double>& mass) const;
+  // Adds minus the derivative of the damping by the velocities [N s/m], which resists them.
+  void add_damping_matrix(const State& state, const std::vector<double>& damping, BlockMatrix& matrix) const;
   // Adds the tangent. With `project` without the negative part that compressed connections have.
   void add_stiffness(const State& state, bool project, BlockMatrix& matrix) const;
 
@@ -62,6 +73,10 @@ class PaperModel {
   [[nodiscard]] Stretch stretched(const State& state, std::uint32_t element,
                                   const ConnectionRows::Entry& entry) const;
   [[nodiscard]] double stiffness(std::uint32_t element, const ConnectionRows::Entry& entry) const;
+  // What the body's columns make of the time of its damping: a factor.
+  [[nodiscard]] double damping_factor(const ConnectionRows::Entry& entry) const {
+    return damping_factor_.empty() ? 1 : damping_factor_[place(entry)];
+  }
   // Its place among the entries of the rows.
   [[nodiscard]] std::size_t place(const ConnectionRows::Entry& entry) const {
     return static_cast<std::size_t>(&entry - rows_.entries.data());
@@ -81,7 +96,8 @@ class PaperModel {
   std::vector<std::uint32_t> part_;  // (elements)
   std::vector<std::uint8_t> active_;
   ConnectionMemory memory_;
-  std::vector<double> factor_;  // (entries of rows_) of the Hooke constant; empty: none
+  // (entries of rows_) of the Hooke constant, and of the time of the damping; empty: 1
+  std::vector<double> factor_, damping_factor_;
 };
 
 }  // namespace flexel::simulate

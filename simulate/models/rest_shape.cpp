@@ -15,9 +15,14 @@
 namespace flexel::simulate {
 namespace {
 
+// Throws InputError: there is one of that name with other components, which would be passed over otherwise.
 const Column* column_of(const Columns& columns, const char* name, int components) {
   const auto found = columns.find(name);
-  return found != columns.end() && found->second.components == components ? &found->second : nullptr;
+  if (found == columns.end()) return nullptr;
+  if (found->second.components != components)
+    throw InputError(fmt::format("column \"{}\" of the body has {} numbers a row: it needs {}", name,
+                                 found->second.components, components));
+  return &found->second;
 }
 
 std::span<const double> row(const Column* column, std::size_t at) {
@@ -116,6 +121,20 @@ double RestShapes::of_connection(std::uint32_t element, std::size_t bit) const {
   return connections_ ? connections_->values[13 * std::size_t{element} + bit] : 0;
 }
 
+void refuse_damaged_columns(const Body& body) {
+  (void)RestShapes(body);
+  for (const char* column : {"stiffness_change", "damping_change", "density_change", "strength_change",
+                             "yield_change", "friction_change", "radius_change"}) {
+    (void)element_factors(body, column);
+    (void)cell_factors(body, column);
+  }
+  for (const char* column : {"plastic_strain", "stick_change"}) (void)element_values(body, column);
+  (void)column_of(body.element_columns, "settled", 3);
+  for (const char* column : {"connection_stiffness_change", "connection_damping_change",
+                             "connection_strength_change", "connection_friction_change"})
+    (void)connection_values(body, column);
+}
+
 std::vector<Vec3> settled_displacement(const Body& body) {
   std::vector<Vec3> settled;
   if (const Column* column = column_of(body.element_columns, "settled", 3))
@@ -145,6 +164,10 @@ std::vector<double> cell_factors(const Body& body, const char* column) {
 std::vector<double> element_values(const Body& body, const char* column) {
   const Column* found = column_of(body.element_columns, column, 1);
   return found ? found->values : std::vector<double>();
+}
+std::span<const double> connection_values(const Body& body, const char* column) {
+  const Column* found = column_of(body.element_columns, column, static_cast<int>(half_neighbourhood.size()));
+  return found ? std::span<const double>(found->values) : std::span<const double>();
 }
 
 }  // namespace flexel::simulate

@@ -14,6 +14,7 @@
 //                        move of a later run starts from
 #pragma once
 #include <optional>
+#include <span>
 
 #include "simulate/models/cell_model.h"
 #include "simulate/models/spring_model.h"
@@ -42,6 +43,9 @@ class RestShapes {
   bool any_ = false;
 };
 
+// Throws InputError: a column that simulations take has another shape than it needs, or a factor in it is not above 0.
+void refuse_damaged_columns(const Body& body);
+
 // (elements) m, column "settled"; empty: none.
 [[nodiscard]] std::vector<Vec3> settled_displacement(const Body& body);
 
@@ -53,10 +57,14 @@ class RestShapes {
 // (elements) the factors of edits at centre placement; empty: none.
 [[nodiscard]] std::vector<double> stiffness_factors(const Body& body);
 [[nodiscard]] std::vector<double> mass_factors(const Body& body);
-// The factors of any such column, of elements and of cells; empty: none. Throws InputError: one is not above 0.
+// The factors of any such column, of elements and of cells; empty: none. Throws InputError: one is not above 0, or
+// the column has another shape.
 [[nodiscard]] std::vector<double> element_factors(const Body& body, const char* column);
 [[nodiscard]] std::vector<double> cell_factors(const Body& body, const char* column);
-// (elements) a column of one number each; empty: none.
+// (elements) a column of one number each; empty: none. Throws InputError: it has more.
 [[nodiscard]] std::vector<double> element_values(const Body& body, const char* column);
+// (elements x 13) a column of the connections of model `paper`, of the body's while it lives; empty: none. Throws
+// likewise.
+[[nodiscard]] std::span<const double> connection_values(const Body& body, const char* column);
 
 }  // namespace flexel::simulate

@@ -9,9 +9,7 @@
 #include "base/parallel.h"
 #include "simulate/effects/part_entries.h"
 #include "simulate/matter/masses.h"
-#include "simulate/models/damping_factors.h"
 #include "simulate/models/paper_model.h"
-#include "simulate/models/rest_shape.h"
 
 namespace flexel::simulate {
 
@@ -54,8 +52,7 @@ std::optional<ConnectionFriction> ConnectionFriction::make(const Parameters& par
                      "no part can have internal friction: it acts along the connections of model \"paper\"");
   if (*std::max_element(made.coefficient_.begin(), made.coefficient_.end()) == 0) return std::nullopt;
   made.mass_ = lumped_masses(problem);
-  made.friction_ = element_factors(problem.body, "friction_change");
-  made.damping_ = element_damping_factors(problem.body);
+  made.body_ = &problem.body;
   return made;
 }
 
@@ -65,14 +62,12 @@ std::string ConnectionFriction::why() const {
 
 void ConnectionFriction::attach(const PaperModel& model, const std::vector<double>& damping) {
   model_ = &model;
+  friction_ = connection_factors(*body_, model.rows(), "friction");
   tau_ = damping;
 }
 
 void ConnectionFriction::add_forces(const State& state, std::vector<Vec3>& forces) {
   if (!model_ || !(state.kick > 0)) return;
-  const auto mean = [](const std::vector<double>& factors, std::uint32_t a, std::uint32_t b) {
-    return factors.empty() ? 1 : 0.5 * (factors[a] + factors[b]);
-  };
   parallel_for_each(
       forces.size(),
       [&](std::size_t at) {
@@ -90,11 +85,12 @@ void ConnectionFriction::add_forces(const State& state, std::vector<Vec3>& force
           const Vec3 sliding = velocity - along * now.direction;
           const double speed = sliding.norm();
           if (!(speed > 0)) continue;
-          const double normal = stiffness * (now.elongation - tau * mean(damping_, e, p) * along);
+          const double normal = stiffness * (now.elongation - tau * model_->damping_factor(entry) * along);
           const double connections = static_cast<double>(std::max(row.size(), model_->rows().of(p).size()));
           const double most =
               mass_[e] * mass_[p] / (mass_[e] + mass_[p]) * speed / (state.kick * connections);
-          const double friction = std::min(std::abs(mu * mean(friction_, e, p) * normal), most);
+          const double factor = friction_.empty() ? 1 : friction_[model_->place(entry)];
+          const double friction = std::min(std::abs(mu * factor * normal), most);
           forces[e] -= (friction / speed) * sliding;
         }
       },

@@ -2,7 +2,7 @@
 // connection c of an element e with its opposite p
 //     F_N = F_b + F_d,   F_f = -|mu_c F_N| v' / |v'|,   v' = v - (v . n) n,   v = v_e - v_p
 // with n the direction of the connection, F_b its elastic force, F_d its damping, and mu_c the scene's coefficient
-// times the mean of what both elements have in the column "friction_change" (section 3.2).
+// times the factor that the body's columns give it (connection_factors(); section 3.2).
 //
 // As printed: the force is not central, so momentum is kept and angular momentum is not, and a body that turns while
 // it is strained is braked ("While this behavior does not violate the model, it may not be what is expected"). Added is
@@ -39,9 +39,11 @@ class ConnectionFriction : public Effect {
 
  private:
   std::size_t entries_ = 0;
-  std::vector<double> coefficient_;                // (parts)
-  std::vector<double> mass_, friction_, damping_;  // (elements) kg; factors, empty: 1
-  std::vector<double> tau_;                        // (parts) s
+  std::vector<double> coefficient_;  // (parts)
+  std::vector<double> mass_;         // (elements) kg
+  std::vector<double> friction_;     // (entries of the model's rows) factors; empty: 1
+  std::vector<double> tau_;          // (parts) s
+  const Body* body_ = nullptr;
   const PaperModel* model_ = nullptr;
 };
 

@@ -17,10 +17,6 @@ Mat3 deviator(const Mat3& tensor) {
   return tensor - tensor.trace() / 3 * Mat3::Identity();
 }
 
-double mean(const std::vector<double>& factors, std::uint32_t a, std::uint32_t b) {
-  return factors.empty() ? 1 : 0.5 * (factors[a] + factors[b]);
-}
-
 // Rate of the length [m/s].
 double rate(const State& state, const Stretch& now, std::uint32_t from, std::uint32_t to) {
   return now.direction.dot(state.velocity[to] - state.velocity[from]);
@@ -40,7 +36,7 @@ ConnectionYield::ConnectionYield(const Problem& problem, const KernelEffects& pl
       model_(model),
       flow_(problem.body.parts.size()),
       elongation_(problem.body.parts.size(), std::numeric_limits<double>::infinity()),
-      strength_(element_factors(problem.body, "strength_change")),
+      strength_(connection_factors(problem.body, model.rows(), "strength")),
       yield_(element_factors(problem.body, "yield_change")) {
   for (std::size_t p = 0; p < body_.parts.size(); ++p) {
     if (body_.parts[p].placement != Placement::centre) continue;
@@ -69,7 +65,8 @@ ConnectionLosses ConnectionYield::advance(const State& state) {
 
 double ConnectionYield::longest(std::uint32_t element, const ConnectionRows::Entry& entry) const {
   return model_.kind(element, entry.kind).length *
-         (1 + elongation_[model_.part_of(element)] * mean(strength_, element, entry.other));
+         (1 +
+          elongation_[model_.part_of(element)] * (strength_.empty() ? 1 : strength_[model_.place(entry)]));
 }
 
 // The energy is that of half a step before: what the leapfrog loses when a force is taken away.

@@ -1,8 +1,8 @@
 // Connections of model `paper` that flow and break (docs/reference/fracture-plasticity.md).
 //
 // Fracture: a connection ends where its length passes t = l (1 + elongation), l its length in the lattice
-// (Jansson and Vergeest, equation 2 and section 4.2); `elongation` times the mean of what its two elements have in
-// the column "strength_change".
+// (Jansson and Vergeest, equation 2 and section 4.2); `elongation` times the factor that the body's columns
+// give it (connection_factors()).
 //
 // Flow: an element has the Kirchhoff stress of its connections, tau = 1/2V sum k e d n (x) n, e the stretch, d the
 // length, n the direction, V the voxel. Its deviator s is kept within |s| <= sqrt(2/3) (yield + hardening a) by a flow
@@ -45,10 +45,11 @@ class ConnectionYield {
 
   const Body& body_;
   PaperModel& model_;
-  std::vector<PlasticFlow> flow_;         // (parts)
-  std::vector<double> elongation_;        // (parts) infinity: none
-  std::vector<double> strength_, yield_;  // (elements) factors; empty: 1
-  std::vector<Mat3> flows_now_;           // (elements)
+  std::vector<PlasticFlow> flow_;   // (parts)
+  std::vector<double> elongation_;  // (parts) infinity: none
+  std::vector<double> strength_;    // (entries of the rows) factors; empty: 1
+  std::vector<double> yield_;       // (elements) likewise
+  std::vector<Mat3> flows_now_;     // (elements)
   bool flows_ = false, breaks_ = false;
 };
 

@@ -103,7 +103,9 @@ std::vector<SceneKey> bond_keys() {
 }
 
 std::vector<SceneKey> damping_keys() {
-  return {{"[damping]", "time", K::quantity, D::time, "required", "the time tau of the dashpots"},
+  return {{"[damping]", "time", K::quantity, D::time, "required; or period", "the time tau of the dashpots"},
+          {"[damping]", "period", K::quantity, D::time, "", "of a swing that decays with the ratio"},
+          {"[damping]", "ratio", K::number, {}, "the material's", "share of the critical, at the period"},
           {"[damping]", "part", K::text, {}, "every part", "a part's name"}};
 }
 
@@ -197,7 +199,7 @@ std::vector<SceneKey> contact_keys() {
       {c, "parts", K::list, {}, "\"all\"", "names of parts that touch"},
       {c, "self", K::flag, {}, "true", "parts touch themselves too"},
       {c, "stiffness", K::number, {}, "1", "of the springs between surfaces, relative to the cells"},
-      {c, "friction", K::number, {}, "0", "coefficient, where the materials give none"},
+      {c, "friction", K::number, {}, "0", "coefficient, where the materials give none; or \"material\""},
       {c, "stick", K::quantity, D::pressure, "0", "traction to pull apart what touched"},
       {c, "damping", K::quantity, D::time, "0", "of the relative motion"},
       {c, "overlap", K::text, {}, "\"refuse\"", "or \"part\": what begins inside something else"},

@@ -14,9 +14,16 @@ namespace flexel::simulate {
 
 template <class... E>
 struct EventList {
-  // [[event]] of a scene, in order of time; of those at one time in order of the file. Throws InputError.
-  [[nodiscard]] static Event parse(TableReader& reader) {
-    const double at = reader.to_quantity(reader.require("at", "\"0.2 s\""), Dimension::time, "at");
+  // [[event]] of a scene; `timed`: of a run in time, where it has a time, at equilibrium it has none (0). Throws
+  // InputError.
+  [[nodiscard]] static Event parse(TableReader& reader, bool timed) {
+    const SceneValue* given = reader.find("at");
+    if (given && !timed)
+      reader.fail(given->line,
+                  "\"at\" is a time of a timed run: give [run] time = \"1 s\", or leave \"at\" out: at "
+                  "equilibrium events happen before the loads act");
+    const double at =
+        timed ? reader.to_quantity(reader.require("at", "\"0.2 s\""), Dimension::time, "at") : 0;
     const SceneValue& what = reader.require("do", "\"renormalise\"");
     std::optional<Event> event;
     const auto attempt = [&](auto parse, const char* name) {

@@ -39,12 +39,14 @@ Material parse_material(TableReader& reader, const std::string& name) {
   material.layer_strength = optional_limit("layer_strength");
   material.elongation = reader.number("elongation").value_or(0);
   material.contact_friction = reader.number("friction");
+  material.damping = reader.number("damping").value_or(0);
   (void)reader.find("stick");      // simulate/effects/contact.cpp
   (void)reader.find("expansion");  // simulate/thermal/thermal.cpp
   (void)reader.find("conductivity");
   reader.finish();
   if (material.contact_friction && !(*material.contact_friction >= 0))
     reader.fail("\"friction\" needs to be 0 or more");
+  if (!(material.damping >= 0)) reader.fail("\"damping\" needs to be 0 or more");
   if (!(material.hardening >= 0)) reader.fail("\"hardening\" needs to be 0 or more");
   if (!(material.elongation >= 0)) reader.fail("\"elongation\" needs to be above 0");
   if (!(material.young > 0)) reader.fail("\"young\" needs to be above 0");
@@ -195,10 +197,8 @@ RunSettings parse_run(TableReader& root) {
 void parse_events(TableReader& root, Scene& scene) {
   for (const SceneValue* table : root.tables("event")) {
     TableReader reader(*table, root.file(), "[[event]]");
-    Event event = Events::parse(reader);
-    if (!scene.run.time)
-      reader.fail("events happen in timed runs only: give [run] time = \"1 s\", or leave them out");
-    if (!(event.at >= 0 && event.at <= *scene.run.time))
+    Event event = Events::parse(reader, scene.run.time.has_value());
+    if (scene.run.time && !(event.at >= 0 && event.at <= *scene.run.time))
       reader.fail(
           fmt::format("\"at\" = {:.6g} s is not within the run, 0 s to {:.6g} s", event.at, *scene.run.time));
     scene.events.push_back(std::move(event));

@@ -7,6 +7,7 @@
 
 #include "base/parallel.h"
 #include "simulate/models/damping_factors.h"
+#include "simulate/models/rest_shape.h"
 #include "simulate/models/stability.h"
 #include "simulate/stepping/staged_damping.h"
 
@@ -23,13 +24,32 @@ struct Fastest {
   }
 };
 
-// Of each part, by what edits made of that of its cells and elements.
+// (elements) The largest factor on the damping of the connections that they have the bits of; empty: 1.
+std::vector<double> of_own_connections(const Body& body) {
+  const std::span<const double> changes = connection_values(body, "connection_damping_change");
+  std::vector<double> largest;
+  if (changes.empty()) return largest;
+  constexpr std::size_t kWidth = half_neighbourhood.size();
+  for (std::size_t e = 0; e < body.element_count(); ++e) {
+    double most = 0;
+    for (std::size_t bit = 0; bit < kWidth; ++bit)
+      if (body.connections[e] >> bit & 1) most = std::max(most, changes[kWidth * e + bit]);
+    largest.push_back(1 + most);
+  }
+  return largest;
+}
+
+// Of each part, by what the body's columns make of that of its cells, elements and connections.
 std::vector<double> longest_damping(const Body& body, const std::vector<double>& of_parts) {
   std::vector<double> longest = of_parts;
-  const std::vector<double> cells = damping_factors(body), elements = element_damping_factors(body);
+  const std::vector<double> cells = damping_factors(body), elements = element_damping_factors(body),
+                            connections = of_own_connections(body);
   for (std::size_t p = 0; p < longest.size(); ++p) {
     const Part& part = body.parts[p];
     const bool by_cells = part.placement == Placement::corner;
+    if (!by_cells && !connections.empty() && part.element_begin < part.element_end)
+      longest[p] *=
+          *std::max_element(connections.begin() + part.element_begin, connections.begin() + part.element_end);
     const std::vector<double>& factor = by_cells ? cells : elements;
     if (factor.empty()) continue;
     const auto from = static_cast<std::ptrdiff_t>(by_cells ? part.cell_begin : part.element_begin);

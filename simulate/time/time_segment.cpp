@@ -140,7 +140,6 @@ void TimeSegment::make_implicit() {
   };
   if (!plan_.plasticity.empty()) refuse("[plasticity]");
   if (!plan_.fracture.empty()) refuse("[fracture]");
-  if (damps_connections()) refuse("[damping] of model \"paper\"");
   for (const ActiveEffect& effect : effects_)
     if (const std::string what = effect->refuses_implicit_steps(); !what.empty()) refuse(what);
   euler_.emplace(problem_, effects_, plan_, stepper_->mass(), scene_.run.tolerance);

@@ -124,6 +124,7 @@ class TimeSegment {
   class ModelTimer;
   void configure_kernel();
   void begin_effects(const SegmentStart& beginning);
+  void store_stuck();
   [[nodiscard]] double effect_seconds() const;
   void make_forces();
   void make_implicit();

@@ -1,10 +1,13 @@
 // Between an act and what is around it: what it is made from, what it leaves in the body, its plan in words.
-#include "simulate/effects/rigid.h"
 #include "simulate/time/time_segment.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
+
+#include "simulate/contact/pairs/stuck_places.h"
+#include "simulate/effects/contact.h"
+#include "simulate/effects/rigid.h"
 
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -39,6 +42,13 @@ void TimeSegment::store(const State& state) {
   stepper_->write_memory(body_.cell_count(), body_.cell_columns);
   if (yield_) yield_->write(body_);
   set_fused_points(body_, fused_);
+  store_stuck();
+}
+
+void TimeSegment::store_stuck() {
+  body_.notes.erase(kStuckNote);
+  for (const ActiveEffect& effect : effects_)
+    if (effect.name == Contact::name) set_stuck_places(body_, stuck_in(effect->transfer_state()));
 }
 
 void TimeSegment::unload() {

@@ -16,6 +16,7 @@
 #include "base/stop.h"
 #include "formats/lattice/body_file.h"
 #include "formats/lattice/fused_points.h"
+#include "simulate/contact/pairs/stuck_places.h"
 #include "simulate/effects/contact.h"
 #include "simulate/live/live_link.h"
 #include "simulate/models/damping_factors.h"
@@ -42,6 +43,7 @@ class TimedRun {
   SimulateResult operator()();
 
  private:
+  void begin();
   void resume(const Checkpoint& from);
   void listen(const std::string& note);
   void keep();
@@ -120,11 +122,27 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
   if (options.resume)
     resume(*options.resume);
   else
-    segment_.emplace(body_, scene_, options_, progress_, start_, state_of(body_));
+    begin();
   if (!options.history.empty())
     history_ = segment_->make_history(options.resume ? options.resume->ledger : Ledger{});
   segment_->set_hear([this](const std::string& note) { listen(note); });
   if (settling_) refuse_timed(segment_->effects(), ActsIn::relaxation_and_time, scene_.name);
+}
+
+// With what stuck at the end of an earlier run.
+void TimedRun::begin() {
+  const std::vector<StuckPlaces> stuck = stuck_places(body_);
+  if (!stuck.empty()) start_.transferred_states = {{Contact::name, transfer_of(stuck)}};
+  segment_.emplace(body_, scene_, options_, progress_, start_, state_of(body_));
+  start_.transferred_states.clear();
+  std::size_t found = 0;
+  for (const auto& [name, transferred] : segment_->transferred_states())
+    if (name == Contact::name) found = stuck_in(transferred).size();
+  if (found < stuck.size())
+    progress_.warn(
+        fmt::format("{} of the {} places that stuck at the end of an earlier run are not there in "
+                    "this scene's contact, and stick no more",
+                    stuck.size() - found, stuck.size()));
 }
 
 void TimedRun::resume(const Checkpoint& from) {
@@ -327,6 +345,7 @@ void TimedRun::apply(std::size_t end) {
   segment_.reset();
   const bool was_edited = edits_damping(body_);
   body_.notes.erase(kFusedNote);  // events change start_.fused and the numbers of elements
+  body_.notes.erase(kStuckNote);  // in the transferred states
   for (; events_ < end; ++events_) {
     const Event& event = scene_.events[events_];
     const Problem problem = timed_problem(body_, scene_, start_);
@@ -334,6 +353,10 @@ void TimedRun::apply(std::size_t end) {
     const std::string what = event.apply(context);
     progress_.say(fmt::format("at {:.4g} s {}: {}", event.at, event.name, what));
   }
+  for (auto& [name, transferred] : start_.transferred_states)
+    if (name == Contact::name)
+      for (const StuckPlaces& came : stuck_places(body_))  // with bodies that were added
+        transferred.insert(transferred.end(), came.begin(), came.end());
   if (kept_) {
     kept_->state.time.reset();  // until the act has begun, what was kept is of another body
     act_body_ = body_bytes(body_);

@@ -1,4 +1,4 @@
-"""Every command in a ```sh block of README.md, docs/ and samples/ works as it stands.
+"""Every command in a ```sh block of README.md, docs/ and samples/README.md works as it stands; samples_test.py has the pages of the samples.
 
 The blocks of a page run one after another in one shell (`bash -eu -o pipefail`), in a folder that looks like the repository after
 tools/demo: build/release/bin, samples and out/bracket.step are there. A block that is not to be run is fenced ```text.
@@ -36,42 +36,6 @@ def test_readme():
 
 def test_samples():
     run_page("samples/README.md")
-
-
-def test_bracket():
-    run_page("samples/bracket/README.md")
-
-
-def test_swing():
-    run_page("samples/swing/README.md")
-
-
-def test_frozen():
-    run_page("samples/frozen/README.md")
-
-
-def test_carved():
-    run_page("samples/carved/README.md")
-
-
-def test_torn():
-    run_page("samples/torn/README.md")
-
-
-def test_dented():
-    run_page("samples/dented/README.md")
-
-
-def test_kneaded():
-    run_page("samples/kneaded/README.md")
-
-
-def test_squeezed():
-    run_page("samples/squeezed/README.md")
-
-
-def test_gripped():
-    run_page("samples/gripped/README.md")
 
 
 def test_docs():

@@ -324,7 +324,7 @@ TEST(Events, WrongEntriesAreRefused) {
   EXPECT_THAT(message(run + event("2 s", "do = \"renormalise\"")), HasSubstr("not within the run"));
   EXPECT_THAT(message(run + event("0.2 s", "do = \"renormalize\"")),
               HasSubstr("did you mean \"renormalise\"?"));
-  EXPECT_THAT(message(event("0.2 s", "do = \"renormalise\"")), HasSubstr("timed runs only"));
+  EXPECT_THAT(message(event("0.2 s", "do = \"renormalise\"")), HasSubstr("a time of a timed run"));
   EXPECT_THAT(message(run + event("0.2 s", "do = \"edit\"")),
               HasSubstr("needs \"stiffness\", \"damping\", \"density\""));
   EXPECT_THAT(message(run + event("0.2 s", "do = \"edit\"\nstiffness = 0")), HasSubstr("is a factor"));

@@ -55,7 +55,7 @@ TEST(DampingMatrix, IsTheKernelsDamping) {
     const StiffnessPattern pattern =
         stiffness_pattern(body, active_cells(problem), connection_rows({}, body.element_count()));
     BlockMatrix matrix = pattern.matrix;
-    set_damping(problem, pattern.stencil, plan.damping, state.displacement, matrix);
+    set_damping(problem, pattern.stencil, PaperModel(problem), plan.damping, state.displacement, matrix);
     std::vector<Vec3> pulled(body.element_count());
     multiply(matrix, velocity, pulled);
     (void)stepper.advance(state, {}, {0, 0, false});

@@ -1,0 +1,153 @@
+// Events of a scene without a time: they change the body before equilibrium is looked for.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "formats/lattice/body_file.h"
+#include "formats/lattice/fused_points.h"
+#include "simulate/scene/scene.h"
+#include "tests/scratch.h"
+#include "tests/simulate/box_body.h"
+#include "tests/simulate/scene_case.h"
+
+namespace flexel::simulate {
+namespace {
+
+using testing::box_body;
+using testing::BoxOptions;
+using ::testing::HasSubstr;
+using testing::refusal;
+using testing::simulate_quietly;
+
+constexpr double kBarCell = 0.01;  // m
+
+Body resting_bar(const std::string& name = "bar", const Vec3& origin = Vec3::Zero()) {
+  BoxOptions options;
+  options.cells = {6, 2, 2};
+  options.spacing = Vec3::Constant(kBarCell);
+  options.name = name;
+  options.origin = origin;
+  return box_body(options);
+}
+
+Scene rest_scene(const std::string& text, const std::string& name = "scene.toml") {
+  return parse_scene(
+      "material = \"gum\"\n[materials.gum]\nyoung = \"1 MPa\"\npoisson = 0.3\ndensity = \"1000 kg/m3\"\n" +
+          text,
+      name);
+}
+
+const std::string kPulled =
+    "[[fix]]\nwhere = \"x0\"\n[[load]]\nwhere = \"x1\"\nforce = [0, 0, \"-0.02 N\"]\n";
+
+Vec3 end_of(Body body, const std::string& events) {
+  (void)simulate_quietly(body, rest_scene(kPulled + events));
+  return body.position.back() - body.rest.back();
+}
+
+// Twice as stiff everywhere: half as far, but for the springs of the fix, which the edit leaves.
+TEST(EventsAtRest, AnEditActsBeforeTheLoad) {
+  const Vec3 plain = end_of(resting_bar(), ""),
+             edited = end_of(resting_bar(), "[[event]]\ndo = \"edit\"\nstiffness = 2\n");
+  EXPECT_NEAR(edited.z(), 0.5 * plain.z(), 1e-3 * std::abs(plain.z()));
+  // in the order of the file: twice twice
+  const Vec3 twice = end_of(resting_bar(),
+                            "[[event]]\ndo = \"edit\"\nstiffness = 2\n[[event]]\ndo = "
+                            "\"edit\"\nstiffness = 2\n");
+  EXPECT_NEAR(twice.z(), 0.25 * plain.z(), 2e-3 * std::abs(plain.z()));
+}
+
+// As a timed run with the event at its start leaves the body, so equilibrium has it.
+TEST(EventsAtRest, CarvingIsThatOfARunInTime) {
+  const std::string carve =
+      "do = \"carve\"\nwhere = { box = { min = [\"19 mm\", \"-1 mm\", \"9 mm\"], max = [\"41 mm\", \"21 "
+      "mm\", \"21 "
+      "mm\"] } }\n";
+  Body timed = resting_bar();
+  (void)simulate_quietly(timed, rest_scene("[[event]]\nat = \"0 s\"\n" + carve + "[run]\ntime = \"1 us\"\n"));
+  timed.element_columns.erase("velocity");
+  timed.position = timed.rest;
+  Body rest = resting_bar();
+  (void)simulate_quietly(rest, rest_scene(kPulled + "[[event]]\n" + carve));
+  EXPECT_LT(rest.element_count(), resting_bar().element_count());
+  EXPECT_EQ(rest.cell_elements, timed.cell_elements);
+  EXPECT_EQ(rest.notes.at("carved"), timed.notes.at("carved"));
+  (void)simulate_quietly(timed, rest_scene(kPulled));
+  EXPECT_EQ(rest.position, timed.position);
+  EXPECT_LT((rest.position.back() - rest.rest.back()).z(), 1.5 * end_of(resting_bar(), "").z()) << "weaker";
+}
+
+// Two bars half a millimetre apart are one, and stay so in the body.
+TEST(EventsAtRest, FusedPartsCarryEachOther) {
+  const flexel::test::Scratch scratch;
+  const std::string path = scratch.path("other.vtu");
+  write_body(resting_bar("other", Vec3(6 * kBarCell + 5e-4, 0, 0)), path);
+  const std::string
+      add = "[[event]]\ndo = \"add\"\nbody = \"" + path + "\"\n",
+      fuse = "[[event]]\ndo = \"fuse\"\nwithin = \"1 mm\"\n",
+      pull = "[[fix]]\nwhere = \"bar/x0\"\n[[load]]\nwhere = \"other/x1\"\nforce = [0, 0, \"-0.02 N\"]\n";
+  EXPECT_THAT(refusal(resting_bar(), rest_scene(pull + add)), HasSubstr("other")) << "it hangs on nothing";
+  Body body = resting_bar();
+  (void)simulate_quietly(body, rest_scene(pull + add + fuse));
+  EXPECT_EQ(body.parts.size(), 2u);
+  EXPECT_FALSE(fused_points(body).empty());
+  // twice as long a cantilever: eight times as far, but for shear
+  const double ratio = (body.position.back() - body.rest.back()).z() / end_of(resting_bar(), "").z();
+  EXPECT_GT(ratio, 6);
+  EXPECT_LT(ratio, 10);
+  Body later = body;
+  (void)simulate_quietly(later, rest_scene(pull));
+  EXPECT_LT((later.position.back() - body.position.back()).norm(),
+            1e-5 * (body.position.back() - body.rest.back()).norm());
+}
+
+// The shape that an earlier run left becomes the rest shape: without a load nothing moves.
+TEST(EventsAtRest, RenormalisingKeepsTheShapeOfAnEarlierRun) {
+  Body body = resting_bar();
+  (void)simulate_quietly(body, rest_scene(kPulled));
+  const std::vector<Vec3> bent = body.position;
+  const std::string hold = "[[fix]]\nwhere = \"x0\"\n";
+  Body sprung = body;
+  (void)simulate_quietly(sprung, rest_scene(hold));
+  (void)simulate_quietly(body, rest_scene(hold + "[[event]]\ndo = \"renormalise\"\n"));
+  const double way = (bent.back() - body.rest.back()).norm();
+  EXPECT_LT((body.position.back() - bent.back()).norm(), 1e-6 * way);
+  EXPECT_GT((sprung.position.back() - bent.back()).norm(), 0.9 * way);
+}
+
+// With contact equilibrium is looked for in steps: the events come before them too.
+TEST(EventsAtRest, TheyComeBeforeARunThatSettlesToo) {
+  const auto sag = [](const std::string& event) {
+    Body body = resting_bar();
+    (void)simulate_quietly(
+        body, rest_scene("[contact]\nself = true\n[[fix]]\nwhere = \"x0\"\n[gravity]\nacceleration = [0, 0, "
+                         "\"-1 m/s2\"]\n" +
+                         event));
+    return (body.position.back() - body.rest.back()).z();
+  };
+  EXPECT_NEAR(sag("[[event]]\ndo = \"edit\"\nstiffness = 2\n"), 0.5 * sag(""), 2e-3 * std::abs(sag("")));
+}
+
+TEST(EventsAtRest, ModelQuadraticRefusesThem) {
+  EXPECT_THAT(refusal(resting_bar(),
+                      rest_scene(kPulled + "[[event]]\ndo = \"edit\"\nstiffness = 2\n[parts.bar]\nmodel = "
+                                           "\"quadratic\"\n")),
+              HasSubstr("has no [[event]]"));
+}
+
+TEST(EventsAtRest, ATimeIsRefusedWithoutOne) {
+  EXPECT_THROW(
+      {
+        try {
+          (void)rest_scene("[[event]]\nat = \"1 s\"\ndo = \"renormalise\"\n");
+        } catch (const InputError& error) {
+          EXPECT_THAT(error.what(), HasSubstr("\"at\" is a time of a timed run"));
+          throw;
+        }
+      },
+      InputError);
+  EXPECT_THROW((void)rest_scene("[run]\ntime = \"1 s\"\n[[event]]\ndo = \"renormalise\"\n"), InputError);
+}
+
+}  // namespace
+}  // namespace flexel::simulate
