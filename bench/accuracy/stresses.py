@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """The largest stress of model `quadratic` and its bar, beside known answers: writes docs/measurements/stresses.md.
 
-    PATH=build/release/bin:$PATH bench/accuracy/stresses.py [--only CASE] [--jobs N] [-o FILE]
+    PATH=build/release/bin:$PATH bench/accuracy/stresses.py [--only CASE] [--random COUNT] [--jobs N] [-o FILE]
 
 Parts are blocks bent to shape (OBJ), on lattices that do not follow them. References: Lame's solutions of thick tubes and spheres;
 NAFEMS LE1 and LE10 (sigma_yy at point D, 92.7 and -5.38 MPa); plates with a hole and with fillets, CalculiX's CPE8 run here (ccx),
@@ -14,6 +14,7 @@ import json
 import math
 import os
 import pathlib
+import random
 import statistics
 import subprocess
 import sys
@@ -149,48 +150,81 @@ def cases():
         "fillet": ((60, 1, 1), between(*fillet, 5), None, fix("s0", "x") + fix("t0", "y") + PLANE_STRAIN + press("s1", -10e6), (6, 4, 3, 2, 1.5), ("plane", fillet)),
         "LE1": ((48, 1, 1), between(arc(2000, 1000), arc(3250, 2750), 100), None, QUARTER + fix("z0", "z") + press("t1", -10e6), (400, 280, 200, 140, 100), ("principal", 0, 92.7e6, (2000, 0, 50))),
         "LE10": ((48, 1, 3), le10, lambda face, i, j: "band" if face == "t1" and i == 1 else "t1" if face == "t1" else face,
-                 QUARTER + '[[fix]]\nwhere = ["t1", "band"]\naxes = "xy"\n' + fix("band", "z") + press("z1", 1e6), (600, 400, 300, 200, 150), ("principal", 2, -5.38e6, (2000, 0, 600))),
+                 QUARTER + '[[fix]]\nwhere = ["t1", "band"]\naxes = "xy"\n' + fix("band", "z") + press("z1", 1e6), (600, 400, 300, 200, 150, 100), ("principal", 2, -5.38e6, (2000, 0, 600))),
     }
 
 
-def unseen_cases():
-    """As cases(); the bars' factors were chosen before these were run. Of a "plane" the third says which loads: "hole" or "fillet"."""
-    pressure, made = 10e6, {}
+class Shapes:
+    """Cases as of cases(), under 10 MPa, by their name. Of a "plane" the third says which loads: "hole" or "fillet"."""
 
-    def tube(inner, outer, sizes, outside=False):
-        share = pressure / (outer**2 - inner**2)
-        true = mises_of_plane_strain(0, -2 * share * outer**2) if outside else mises_of_plane_strain(-pressure, share * (outer**2 + inner**2))
-        made[f"tube {inner}, {outer}, {'outer' if outside else 'inner'}"] = (
+    def __init__(self):
+        self.made = {}
+
+    def tube(self, inner, outer, sizes, outside=False):
+        share = 10e6 / (outer**2 - inner**2)
+        true = mises_of_plane_strain(0, -2 * share * outer**2) if outside else mises_of_plane_strain(-10e6, share * (outer**2 + inner**2))
+        self.made[f"tube {inner:g}, {outer:g}, {'outer' if outside else 'inner'}"] = (
             (48, 1, 1), between(arc(inner, inner), arc(outer, outer), 0.4 * inner), None,
-            QUARTER + PLANE_STRAIN + press("t1" if outside else "t0", pressure), sizes, ("mises", true))
+            QUARTER + PLANE_STRAIN + press("t1" if outside else "t0", 10e6), sizes, ("mises", true))
 
-    def sphere(inner, outer, sizes):
+    def sphere(self, inner, outer, sizes):
         def point(s, t, z):
             return tuple(x * (inner + (outer - inner) * t) / (20 + 20 * t) for x in octant(s, t, z))
-        made[f"sphere {inner}, {outer}"] = ((32, 1, 32), point, None, fix("s0", "y") + fix("s1", "x") + fix("z0", "z") + press("t0", pressure), sizes,
-                                            ("mises", 1.5 * pressure * outer**3 / (outer**3 - inner**3)))
+        self.made[f"sphere {inner:g}, {outer:g}"] = (
+            (32, 1, 32), point, None, fix("s0", "y") + fix("s1", "x") + fix("z0", "z") + press("t0", 10e6), sizes,
+            ("mises", 15e6 * outer**3 / (outer**3 - inner**3)))
 
-    def hole(a, b, side, sizes):
+    def hole(self, a, b, side, sizes):
         curves = (arc(a, b), square(side))
-        made[f"hole {a}, {b} in {side}"] = ((48, 1, 1), between(*curves, 0.8 * min(a, b)), None,
-                                            QUARTER + PLANE_STRAIN + '[[load]]\nwhere = "xmax"\npressure = "-10 MPa"\n', sizes, ("plane", curves, "hole"))
+        self.made[f"hole {a:g}, {b:g} in {side:g}"] = (
+            (48, 1, 1), between(*curves, 0.8 * min(a, b)), None,
+            QUARTER + PLANE_STRAIN + '[[load]]\nwhere = "xmax"\npressure = "-10 MPa"\n', sizes, ("plane", curves, "hole"))
 
-    def fillet(narrow, wide, radius, sizes):
+    def fillet(self, narrow, wide, radius, sizes):
         curves = (lambda s: (100 * s, 0.0), stepped(narrow, wide, radius, 100))
-        made[f"fillet {radius}, {narrow} to {wide}"] = ((60, 1, 1), between(*curves, radius), None, fix("s0", "x") + fix("t0", "y") + PLANE_STRAIN + press("s1", -10e6),
-                                                        sizes, ("plane", curves, "fillet"))
+        self.made[f"fillet {radius:g}, {narrow:g} to {wide:g}"] = (
+            (60, 1, 1), between(*curves, radius), None, fix("s0", "x") + fix("t0", "y") + PLANE_STRAIN + press("s1", -10e6),
+            sizes, ("plane", curves, "fillet"))
 
-    tube(16, 28, (7.3, 4.2))
-    tube(22, 44, (10.5, 6.1))
-    tube(14, 26, (7.1, 4.3), True)
-    sphere(18, 34, (8.7, 5.7))
-    sphere(14, 40, (9.3, 6.3))
-    hole(7, 7, 45, (5.3, 3.3))
-    hole(9, 6, 42, (4.9, 3.1))
-    hole(10, 12, 40, (6.7, 4.4))
-    fillet(14, 26, 8, (5.3, 3.4))
-    fillet(16, 36, 14, (7.7, 5.1))
-    return made
+
+def unseen_cases():
+    """The bars' factors were not chosen on these."""
+    shapes = Shapes()
+    shapes.tube(16, 28, (7.3, 4.2))
+    shapes.tube(22, 44, (10.5, 6.1))
+    shapes.tube(14, 26, (7.1, 4.3), True)
+    shapes.sphere(18, 34, (8.7, 5.7))
+    shapes.sphere(14, 40, (9.3, 6.3))
+    shapes.hole(7, 7, 45, (5.3, 3.3))
+    shapes.hole(9, 6, 42, (4.9, 3.1))
+    shapes.hole(10, 12, 40, (6.7, 4.4))
+    shapes.fillet(14, 26, 8, (5.3, 3.4))
+    shapes.fillet(16, 36, 14, (7.7, 5.1))
+    return shapes.made
+
+
+def random_cases(count):
+    """As many of each of four shapes, measures and sizes by chance, the same ones in every run: walls of 1 to 5 cells, notches whose radius is 1 to 4 cells."""
+    chance, shapes = random.Random(21), Shapes()
+    between_them = lambda low, high: round(chance.uniform(low, high), 2)
+    cells = lambda low, high: math.exp(chance.uniform(math.log(low), math.log(high)))
+    while len(shapes.made) < count:
+        kind = len(shapes.made) % 4
+        inner = between_them(12, 24)
+        if kind == 0:
+            outer = round(inner * chance.uniform(1.5, 2.3), 2)
+            shapes.tube(inner, outer, (round((outer - inner) / cells(1, 5), 2),), chance.random() < 0.5)
+        elif kind == 1:
+            outer = round(inner * chance.uniform(1.6, 2.6), 2)
+            shapes.sphere(inner, outer, (round((outer - inner) / cells(1.5, 4), 2),))
+        elif kind == 2:
+            along = between_them(6, 11)
+            across = round(along * chance.uniform(0.6, 1.4), 2)
+            shapes.hole(along, across, between_them(36, 50), (round(min(along, across) / cells(1, 4), 2),))
+        else:
+            narrow, radius = between_them(12, 17), between_them(6, 14)
+            shapes.fillet(narrow, round(narrow + radius + chance.uniform(3, 9), 2), radius, (round(radius / cells(1, 4), 2),))
+    return shapes.made
 
 
 def plane_reference(folder, low, high, loaded, held, counts, graded):
@@ -298,11 +332,15 @@ def run_case(folder, name, case, sizes):
 
 def table(results):
     """The cases that the bars' factors were chosen on, then the others."""
-    seen = {name: rows for name, rows in results.items() if name in cases()}
-    unseen = {name: rows for name, rows in results.items() if name not in cases()}
-    text = one_table(seen)  # the page's head, whatever was run
-    if unseen:
-        text += "\n## Other cases\n\nThe bars' factors were chosen before these were run. Radii and widths in mm.\n\n" + one_table(unseen).split("\n\n", 2)[2]
+    listed = {"": cases(), "## Other cases\n\nThe bars' factors were not chosen on these. Radii and widths in mm.": unseen_cases()}
+    left, text = dict(results), ""
+    for head, which in listed.items():
+        some = {name: left.pop(name) for name in which if name in left}
+        if some or not head:  # the page's head, whatever was run
+            text += (f"\n{head}\n\n" + one_table(some).split("\n\n", 2)[2]) if head else one_table(some)
+    if left:
+        text += ("\n## Cases at random\n\nMeasures (mm) and sizes by chance (`--random`); the bars' factors were not chosen on these.\n\n" +
+                 one_table(left).split("\n\n", 2)[2])
     return text
 
 
@@ -330,6 +368,7 @@ def main():
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("-o", "--output", default=ROOT / "docs/measurements/stresses.md", type=pathlib.Path)
     arguments.add_argument("--only", action="append")
+    arguments.add_argument("--random", type=int, default=0, metavar="COUNT", help="add so many cases, of measures and sizes by chance")
     arguments.add_argument("--jobs", type=int, default=1, help="cases at a time")
     options = arguments.parse_args()
 
@@ -337,7 +376,8 @@ def main():
         with tempfile.TemporaryDirectory() as place:
             return function(pathlib.Path(place), *words)
 
-    chosen = {name: case for name, case in {**cases(), **unseen_cases()}.items() if not options.only or name in options.only}
+    chosen = {name: case for name, case in {**cases(), **unseen_cases(), **random_cases(options.random)}.items()
+              if not options.only or name in options.only}
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
         # the finest first: they take longest
         runs = {(name, size): pool.submit(in_a_folder, run_case, name, case, [size])

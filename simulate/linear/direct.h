@@ -1,6 +1,6 @@
 // Direct solution of small systems: the coarsest level, and matrices too small for a hierarchy.
 #pragma once
-#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
 #include <vector>
 
 #include "base/math/vec.h"
@@ -8,21 +8,44 @@
 
 namespace flexel::simulate {
 
-// LDL^T (Eigen's SimplicialLDLT, approximate minimum degree) of a symmetric matrix whose diagonal is raised
-// by one part in 1e9. Pivots count by magnitude, so that the solution operator is positive definite whatever
-// the matrix.
+// LDL^T (supernodes, left-looking: Ng and Peyton 1993; approximate minimum degree) of a symmetric matrix whose diagonal is
+// raised by one part in 1e9. Pivots count by magnitude, so that the solution operator is positive definite whatever
+// the matrix. Serial: the same bits for any thread count.
 class DirectSolver {
  public:
-  // Takes the lower half. The pattern of a second call must be that of the first.
+  // Takes the lower half. The pattern of a second call must be that of the first. May be stopped (base/stop.h), and is to be called
+  // again then.
   void factorise(const Eigen::SparseMatrix<double>& lower);
   // x = A^-1 x in place; x has one value per row.
   void solve(double* x) const;
 
  private:
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor_;
-  Eigen::VectorXd inverse_pivots_;
-  mutable Eigen::VectorXd work_;
-  bool analysed_ = false;
+  // Columns next to each other that have the same rows below them: a dense matrix, by columns, of their own rows and those.
+  struct Supernode {
+    int first = 0, width = 0;
+    std::size_t rows = 0, below = 0;  // those below: where they begin in rows_, how many
+    std::size_t values = 0;           // where it begins in values_
+  };
+  using Panel = Eigen::Map<Eigen::MatrixXd>;
+
+  void analyse(const Eigen::SparseMatrix<double>& lower);
+  void find_supernodes(const std::vector<int>& parent, const std::vector<int>& below);
+  void find_rows(const Eigen::SparseMatrix<double>& lower);
+  void update(const Supernode& from, std::size_t begin, std::size_t end, Panel& panel);
+  void eliminate(const Supernode& node, double least, Panel& panel);
+  [[nodiscard]] std::size_t height(const Supernode& node) const {
+    return static_cast<std::size_t>(node.width) + node.below;
+  }
+
+  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> order_;  // from rows to places
+  std::vector<Supernode> supernodes_;                                    // ascending
+  std::vector<int> supernode_of_;                                        // (columns)
+  std::vector<int> rows_;                                                // ascending in each supernode
+  std::vector<double> values_;  // unit lower triangles; what is above the diagonals is of no meaning
+  Eigen::VectorXd pivots_, inverse_pivots_;
+  std::vector<int> local_;  // (rows) place in the panel at hand
+  Eigen::MatrixXd product_;
+  mutable Eigen::VectorXd work_, below_;
 };
 
 // Whether factorise() takes no more multiplications of a symmetric matrix of 3x3 blocks, by its pattern: 27 / 2 of a pair of

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kSafety = 1.25, kWideSafety = 3;
 // Of stresses of a field: measured (bench/accuracy/stresses.py).
-constexpr double kFieldSafety = 1.25, kDoubtSafety = 1.5;
+constexpr double kGrowingSafety = 2.25, kDoubtSafety = 1.5;
 constexpr double kLeastOrder = 0.5, kModelOrder = 2, kSuspiciousOrder = 2.1;
 constexpr int kOrderIterations = 50;
 constexpr double kHardlyDiffer = 1e-3;  // stresses, relative
@@ -62,8 +62,11 @@ std::optional<Bar> stress_bar(const Sequence& s, bool singular) {
 std::optional<Bar> field_stress_bar(const Sequence& s, std::size_t lattices, double doubt, bool singular) {
   const double e21 = std::abs(s.value[1] - s.value[0]), e32 = std::abs(s.value[2] - s.value[1]);
   if (singular && std::max(e21, e32) > kHardlyDiffer * std::abs(s.value[0])) return std::nullopt;
-  const double lattice = lattices < 3 ? kWideSafety * e21
-                                      : std::max(kFieldSafety * e21, e32 / std::pow(s.ratio[0], kModelOrder));
+  // A notch of a cell or two: the peak begins to show, and the values are not near a limit yet.
+  const bool grows = s.value[0] > s.value[1] && s.value[1] > s.value[2] && e21 > e32;
+  const double lattice =
+      lattices < 3 ? kWideSafety * e21
+                   : std::max((grows ? kGrowingSafety : 1) * e21, e32 / std::pow(s.ratio[0], kModelOrder));
   return Bar{std::max(lattice, kDoubtSafety * doubt), s.value[0], std::nullopt};
 }
 

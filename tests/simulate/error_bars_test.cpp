@@ -66,12 +66,26 @@ Sequence stresses(const std::function<double(double)>& at) {
 
 // Of model `quadratic`: the larger of what the lattices and what the field itself leaves open.
 TEST(StressBar, OfAFieldIsTheLargestDoubt) {
-  EXPECT_NEAR(field_stress_bar({{5, 5.2, 5.4}, {2, 2}}, 3, 0.1, false)->half_width, 0.25, 1e-12);
+  EXPECT_NEAR(field_stress_bar({{5, 5.2, 5.4}, {2, 2}}, 3, 0.1, false)->half_width, 0.2, 1e-12);
   EXPECT_NEAR(field_stress_bar({{5, 5.2, 8.2}, {2, 2}}, 3, 0.1, false)->half_width, 0.75, 1e-12);
   EXPECT_NEAR(field_stress_bar({{5, 5.2, 5.4}, {2, 2}}, 3, 0.9, false)->half_width, 1.35, 1e-12);
   EXPECT_NEAR(field_stress_bar({{5, 5.2, 5.2}, {2, 2}}, 2, 0.1, false)->half_width, 0.6, 1e-12);
+  EXPECT_NEAR(field_stress_bar({{5, 4.8, 4.7}, {2, 2}}, 3, 0.1, false)->half_width, 0.45, 1e-12);  // grows
+  EXPECT_NEAR(field_stress_bar({{5, 4.8, 4.5}, {2, 2}}, 3, 0.1, false)->half_width, 0.2, 1e-12);   // settles
+  EXPECT_NEAR(field_stress_bar({{5, 4.8, 4.9}, {2, 2}}, 3, 0.1, false)->half_width, 0.2, 1e-12);
   EXPECT_FALSE(field_stress_bar({{5, 4.8, 4.4}, {2, 2}}, 3, 0, true).has_value());
   EXPECT_TRUE(field_stress_bar({{5, 5.001, 5.003}, {2, 2}}, 3, 0, true).has_value());
+}
+
+// A peak that cells of h begin to see, 1 / (1 + (h / r)^2) of 1: the bar holds it wherever the notch is wider than a cell.
+TEST(StressBar, OfAFieldHoldsAPeakThatBeginsToShow) {
+  for (double h = 0.05; h < 1; h *= 1.1) {
+    const auto peak = [&](double cell) { return 1 / (1 + cell * cell); };
+    const double value = peak(h);
+    const auto bar = field_stress_bar({{value, peak(2 * h), peak(4 * h)}, {2, 2}}, 3, 0, false);
+    EXPECT_GE(bar->half_width, 1 - value) << h;
+    EXPECT_LE(bar->half_width, 5 * (1 - value)) << h;
+  }
 }
 
 TEST(StressBar, HoldsTheLimitOrThereIsNone) {
