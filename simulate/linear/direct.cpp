@@ -194,12 +194,14 @@ void DirectSolver::update(const Supernode& from, std::size_t begin, std::size_t 
              columns = static_cast<Eigen::Index>(end - begin);
   const Panel other(&values_[from.values], static_cast<Eigen::Index>(height(from)), from.width);
   const auto lower = other.bottomRows(rows);
-  product_.noalias() =
+  product_.resize(std::max(product_.size(), static_cast<std::size_t>(rows * columns)));
+  Panel product(product_.data(), rows, columns);
+  product.noalias() =
       lower * (lower.topRows(columns) * pivots_.segment(from.first, from.width).asDiagonal()).transpose();
   const int* at = &rows_[from.rows + begin];
   for (Eigen::Index c = 0; c < columns; ++c) {
     double* to = panel.col(local_[at[c]]).data();
-    const double* values = product_.col(c).data();
+    const double* values = product.col(c).data();
     for (Eigen::Index r = c; r < rows; ++r) to[local_[at[r]]] -= values[r];
   }
 }
@@ -234,6 +236,10 @@ void DirectSolver::solve(double* x) const {
   if (inverse_pivots_.size() == 0) return;
   Eigen::Map<Eigen::VectorXd> vector(x, inverse_pivots_.size());
   work_.noalias() = order_ * vector;
+  const auto below_of = [&](const Supernode& node) {
+    below_.resize(std::max(below_.size(), node.below));
+    return Eigen::Map<Eigen::VectorXd>(below_.data(), static_cast<Eigen::Index>(node.below));
+  };
   const auto panel = [&](const Supernode& node) {
     return Eigen::Map<const Eigen::MatrixXd>(&values_[node.values], static_cast<Eigen::Index>(height(node)),
                                              node.width);
@@ -242,18 +248,17 @@ void DirectSolver::solve(double* x) const {
     const auto values = panel(node);
     auto own = work_.segment(node.first, node.width);
     values.topRows(node.width).triangularView<Eigen::UnitLower>().solveInPlace(own);
-    below_.noalias() = values.bottomRows(static_cast<Eigen::Index>(node.below)) * own;
-    for (std::size_t r = 0; r < node.below; ++r)
-      work_[rows_[node.rows + r]] -= below_[static_cast<Eigen::Index>(r)];
+    auto below = below_of(node);
+    below.noalias() = values.bottomRows(below.size()) * own;
+    for (std::size_t r = 0; r < node.below; ++r) work_[rows_[node.rows + r]] -= below_[r];
   }
   work_.array() *= inverse_pivots_.array();
   for (auto node = supernodes_.rbegin(); node != supernodes_.rend(); ++node) {
     const auto values = panel(*node);
     auto own = work_.segment(node->first, node->width);
-    below_.resize(static_cast<Eigen::Index>(node->below));
-    for (std::size_t r = 0; r < node->below; ++r)
-      below_[static_cast<Eigen::Index>(r)] = work_[rows_[node->rows + r]];
-    own.noalias() -= values.bottomRows(static_cast<Eigen::Index>(node->below)).transpose() * below_;
+    const auto below = below_of(*node);
+    for (std::size_t r = 0; r < node->below; ++r) below_[r] = work_[rows_[node->rows + r]];
+    own.noalias() -= values.bottomRows(below.size()).transpose() * below;
     values.topRows(node->width).triangularView<Eigen::UnitLower>().transpose().solveInPlace(own);
   }
   vector.noalias() = order_.transpose() * work_;

@@ -44,8 +44,10 @@ class DirectSolver {
   std::vector<double> values_;  // unit lower triangles; what is above the diagonals is of no meaning
   Eigen::VectorXd pivots_, inverse_pivots_;
   std::vector<int> local_;  // (rows) place in the panel at hand
-  Eigen::MatrixXd product_;
-  mutable Eigen::VectorXd work_, below_;
+  // Not Eigen's: a matrix of its whose memory does not suffice for another size is freed twice (3.4).
+  std::vector<double> product_;
+  mutable std::vector<double> below_;
+  mutable Eigen::VectorXd work_;
 };
 
 // Whether factorise() takes no more multiplications of a symmetric matrix of 3x3 blocks, by its pattern: 27 / 2 of a pair of
