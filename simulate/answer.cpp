@@ -48,9 +48,10 @@ std::string place_in_one_unit(const Vec3& at) {
 // Why a bar is wide, or missing, of the note of simulate/estimate/error_bars.cpp.
 std::string reason(const SimulateResult& result) {
   const std::string& note = result.error_bars.note;
+  if (const std::size_t end = note.rfind(", under two cells)"); end != std::string::npos)
+    return ": " + note.substr(0, note.rfind(" (", end));
   if (note.find("wall") != std::string::npos || note.find("one cell thick") != std::string::npos)
     return ": its walls are only a few cells thick";
-  if (note.starts_with("the support")) return ": " + note.substr(0, note.find(": "));
   return "";
 }
 

@@ -191,6 +191,7 @@ std::vector<std::vector<std::uint32_t>> large_neighbours(const Part& part, const
   std::vector<std::pair<Point, std::uint32_t>> points;
   for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
     points.emplace_back(point(position[e]), e);
+  if (points.empty()) return {};
   add_guards(points);
   const Delaunay delaunay(points.begin(), points.end());
   std::vector<std::vector<std::uint32_t>> neighbours(part.element_end - part.element_begin);

@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <map>
 
 #include "base/human.h"
@@ -35,7 +36,8 @@ void for_each_rim_edge(const Surface& surface, std::uint32_t polygon, const Use&
 
 }  // namespace
 
-std::optional<double> width_amid_matter(const Surface& surface, const std::vector<std::uint32_t>& polygons) {
+std::optional<double> width_amid_matter(const Surface& surface, const std::vector<std::uint32_t>& polygons,
+                                        const std::vector<std::uint32_t>& held) {
   std::map<EndsOfRim, std::uint32_t> rim;  // directed edges of the region whose opposite is not of it
   double area = 0;
   for (const std::uint32_t polygon : polygons) {
@@ -48,7 +50,7 @@ std::optional<double> width_amid_matter(const Surface& surface, const std::vecto
   for (const auto& [ends, polygon] : rim)
     length += (Eigen::Map<const Vec3>(ends[1].data()) - Eigen::Map<const Vec3>(ends[0].data())).norm();
   for (std::uint32_t other = 0; other < surface.polygon_count(); ++other) {
-    if (std::binary_search(polygons.begin(), polygons.end(), other)) continue;
+    if (std::binary_search(held.begin(), held.end(), other)) continue;
     for_each_rim_edge(surface, other, [&](const Vec3& a, const Vec3& b) {
       const auto found = rim.find({rim_point(b), rim_point(a)});
       if (found == rim.end()) return;
@@ -65,13 +67,23 @@ std::optional<double> width_amid_matter(const Surface& surface, const std::vecto
 
 std::string support_under_two_cells(const Body& body, const Scene& scene) {
   constexpr double kCells = 2;
-  for (const Tie& tie : scene.get<Supports>().ties) {
-    const std::vector<std::uint32_t> polygons = resolve(tie.where, body).polygons;
-    if (polygons.empty()) continue;
-    const Part& part = body.parts[body.surface.polygon_part(polygons.front())];
-    const std::optional<double> width = width_amid_matter(body.surface, polygons);
+  const std::vector<Tie>& ties = scene.get<Supports>().ties;
+  std::vector<std::vector<std::uint32_t>> regions;
+  std::vector<std::uint32_t> held;
+  for (const Tie& tie : ties) {
+    regions.push_back(resolve(tie.where, body).polygons);
+    std::vector<std::uint32_t> all;
+    std::set_union(held.begin(), held.end(), regions.back().begin(), regions.back().end(),
+                   std::back_inserter(all));
+    held = std::move(all);
+  }
+  for (std::size_t t = 0; t < ties.size(); ++t) {
+    if (regions[t].empty()) continue;
+    const Part& part = body.parts[body.surface.polygon_part(regions[t].front())];
+    const std::optional<double> width = width_amid_matter(body.surface, regions[t], held);
     if (width && *width < kCells * part.lattice.spacing.mean())
-      return fmt::format("the support \"{}\" is {} wide, under two cells", tie.name, human_length(*width));
+      return fmt::format("the {} \"{}\" is narrow (a strip of its area and rim is {} wide, under two cells)",
+                         ties[t].link ? "rigid link" : "support", ties[t].name, human_length(*width));
   }
   return "";
 }

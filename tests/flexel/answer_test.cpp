@@ -64,6 +64,15 @@ TEST(Answer, TheBarDecidesTheWords) {
   EXPECT_THAT(guess, Not(HasSubstr("+-")));
 }
 
+TEST(Answer, ANarrowSupportIsNamedWhateverItsName) {
+  Case made = with_bar(0.79);
+  made.result.error_bars.note =
+      "the support \"wall: inner\" is narrow (a strip of its area and rim is 1.45 mm wide, under two cells): "
+      "the "
+      "bars are three times the largest difference; use a smaller spacing";
+  EXPECT_THAT(made.text(), HasSubstr("hardly, off by up to 79 %: the support \"wall: inner\" is narrow\n"));
+}
+
 TEST(Answer, WithoutABarNothingIsPromised) {
   Case bare = with_bar(0.03);
   bare.result.error_bars = {};

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "simulate/effects/supports.h"
 #include "simulate/estimate/narrow_support.h"
 
 namespace flexel::simulate {
@@ -33,20 +34,59 @@ Surface squares(double height) {
   return surface;
 }
 
+std::optional<double> width_alone(const Surface& surface, const std::vector<std::uint32_t>& polygons) {
+  return width_amid_matter(surface, polygons, polygons);
+}
+
 TEST(NarrowSupport, APatchAndThePitOfAScrewAreAmidMatterAndAnEndIsNot) {
   const std::vector<std::uint32_t> middle = {4};
-  EXPECT_DOUBLE_EQ(width_amid_matter(squares(0), middle).value(), 0.5);     // flush
-  EXPECT_DOUBLE_EQ(width_amid_matter(squares(-0.4), middle).value(), 0.5);  // at the bottom of a pit
-  EXPECT_EQ(width_amid_matter(squares(0.4), middle), std::nullopt) << "the end of a boss";
+  EXPECT_DOUBLE_EQ(width_alone(squares(0), middle).value(), 0.5);     // flush
+  EXPECT_DOUBLE_EQ(width_alone(squares(-0.4), middle).value(), 0.5);  // at the bottom of a pit
+  EXPECT_EQ(width_alone(squares(0.4), middle), std::nullopt) << "the end of a boss";
   std::vector<std::uint32_t> all;
   for (std::uint32_t n = 0; n < 9; ++n) all.push_back(n);
-  EXPECT_EQ(width_amid_matter(squares(0), all), std::nullopt) << "nothing goes on beside it";
+  EXPECT_EQ(width_alone(squares(0), all), std::nullopt) << "nothing goes on beside it";
   // A strip from side to side: flush along six of its eight edges.
-  EXPECT_DOUBLE_EQ(width_amid_matter(squares(0), {3, 4, 5}).value(), 0.75);
+  EXPECT_DOUBLE_EQ(width_alone(squares(0), {3, 4, 5}).value(), 0.75);
   // Along one side: three of eight edges.
-  EXPECT_DOUBLE_EQ(width_amid_matter(squares(0), {0, 1, 2}).value(), 0.75);
-  EXPECT_EQ(width_amid_matter(squares(0), {0, 1, 2, 3, 4, 5, 6, 7}).has_value(), false) << "two of twelve";
-  EXPECT_EQ(width_amid_matter(squares(0), {}), std::nullopt);
+  EXPECT_DOUBLE_EQ(width_alone(squares(0), {0, 1, 2}).value(), 0.75);
+  EXPECT_EQ(width_alone(squares(0), {0, 1, 2, 3, 4, 5, 6, 7}).has_value(), false) << "two of twelve";
+  EXPECT_EQ(width_alone(squares(0), {}), std::nullopt);
+}
+
+TEST(NarrowSupport, WhatIsHeldBesideItGivesNoWay) {
+  const std::vector<std::uint32_t> strip = {3, 4, 5}, all = {0, 1, 2, 3, 4, 5, 6, 7, 8};
+  EXPECT_EQ(width_amid_matter(squares(0), strip, all), std::nullopt) << "the other parts of an end";
+  EXPECT_DOUBLE_EQ(width_amid_matter(squares(0), {3}, strip).value(), 0.5);  // flush along two of its edges
+}
+
+TEST(NarrowSupport, IsToldByWhatItIs) {
+  Body body;
+  body.surface = squares(0);
+  body.surface.faces = {{"", 0}};
+  body.surface.parts = {{"plate"}};
+  Part part;
+  part.name = "plate";
+  part.lattice.spacing = Vec3::Constant(0.4);
+  body.parts = {part};
+  body.surface.polygon_face = {0, 0, 0, 0, 1, 0, 0, 0, 0};
+  body.surface.faces.push_back({"", 0});
+  Scene scene;
+  Tie tie;
+  tie.where = select_by_name("plate/2");
+  tie.name = "ring: inner";
+  scene.get<Supports>().ties = {tie};
+  EXPECT_EQ(
+      support_under_two_cells(body, scene),
+      "the support \"ring: inner\" is narrow (a strip of its area and rim is 500 mm wide, under two cells)");
+  scene.get<Supports>().ties.front().link.emplace();
+  EXPECT_THAT(support_under_two_cells(body, scene), testing::StartsWith("the rigid link \"ring: inner\""));
+  body.parts.front().lattice.spacing = Vec3::Constant(0.25);
+  EXPECT_EQ(support_under_two_cells(body, scene), "") << "two cells";
+  body.parts.front().lattice.spacing = Vec3::Constant(0.4);
+  tie.where = select_by_name("plate/1");
+  scene.get<Supports>().ties.push_back(tie);
+  EXPECT_EQ(support_under_two_cells(body, scene), "") << "all around it is held too";
 }
 
 }  // namespace
