@@ -138,7 +138,8 @@ std::string json_of(const CadWritten& written, const MapOutput& output) {
                                  {"volume_after", written.volume}};
   for (const CadFace& face : written.missed)
     json["missed"].push_back({{"face", face.name}, {"deviation", face.deviation}});
-  return json.dump();
+  return json.dump(-1, ' ', false,
+                   nlohmann::ordered_json::error_handler_t::replace);  // paths and names may not be UTF-8
 }
 
 ChildLimits limits_of(const Body& body) {

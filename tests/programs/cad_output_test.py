@@ -74,6 +74,13 @@ def test_one_run_tells_the_faces_it_wrote():
         expect(abs(file["volume_after"] * 1e9 / volume(file["file"]) - 1) < 1e-3, f"{file}")
 
 
+def test_a_name_that_is_not_utf_8_is_a_name():
+    bent()
+    name = os.fsdecode(b"bent\xff.brep")
+    expect_ok(run("flexel-map", "bent.vtu", "-o", name))
+    expect(pathlib.Path(name).stat().st_size > 0, "written")
+
+
 def test_corners_are_where_points_go():
     """flexel-map --points moves the corners without any CAD library."""
     bent()

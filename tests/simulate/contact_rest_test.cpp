@@ -199,6 +199,42 @@ TEST(Contact, APinThatFillsAHoleFeelsNothingUntilItIsPushed) {
   }
 }
 
+// Its edge and its faces press, as those of one that comes from apart, but for pairs that come near when they are deep.
+TEST(Contact, ATiltedBoxThatBeginsInAFlatFacePresses) {
+  struct Begins {
+    double angle, depth;  // degrees, spacings
+  };
+  for (const auto& [angle, depth] : {Begins{3, 0.045}, Begins{10, 0.1}, Begins{20, 0.1}, Begins{40, 0.1}}) {
+    const double tilt = angle * std::numbers::pi / 180;
+    const auto force_on_box = [&](double above) {  // m, of its lowest edge at rest
+      Body body = block("base", {8, 8, 3}, Vec3(-4 * kSide, -4 * kSide, -3 * kSide));
+      append(body,
+             block("box", {4, 4, 3}, Vec3(-2.3 * kSide, -2.2 * kSide, 4 * kSide * std::sin(tilt) + above),
+                   turn(tilt, Vec3::UnitY())));
+      const Problem problem = problem_of(body);
+      Contacts contacts(all_parts(body), problem);
+      State state = starting_at_rest(body);
+      std::vector<Vec3> forces(body.element_count(), Vec3::Zero());
+      const auto put = [&](double way) {
+        for (std::uint32_t e = body.parts[1].element_begin; e < body.parts[1].element_end; ++e)
+          state.displacement[e] = Vec3(0, 0, way);
+        std::fill(forces.begin(), forces.end(), Vec3::Zero());
+        contacts.add_forces(state, forces);
+        contacts.finish_step(state, 0);
+      };
+      for (int step = 0; above > 0 && step < 4; ++step) put(-0.25 * step * above);
+      put(-depth * kSide - above);
+      Vec3 sum = Vec3::Zero();
+      for (std::uint32_t e = body.parts[1].element_begin; e < body.parts[1].element_end; ++e)
+        sum += forces[e];
+      return sum;
+    };
+    const Vec3 begins = force_on_box(-depth * kSide), comes = force_on_box(0.4 * kSide);
+    EXPECT_GT(comes.z(), 1) << angle;  // N
+    EXPECT_LT((begins - comes).norm(), 0.02 * comes.norm()) << angle;
+  }
+}
+
 // The sides of a block that is pressed and slides out look at each other while they are far inside: the way
 // out gives no more than the pressing took.
 TEST(Contact, ABlockThatSlidesOutFromUnderAnotherIsNotThrown) {

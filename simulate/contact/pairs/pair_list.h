@@ -73,6 +73,7 @@ class PairList {
   const ContactSurface& surface_;
   ContactMaterials materials_;
   ExcludedPairs excluded_;
+  std::vector<std::uint8_t> curved_;  // (surface points) 1: a face of a curved surface; empty: none is asked
   std::vector<ContactPair> pairs_;
   std::vector<std::uint32_t> points_, elements_;
   std::vector<ElementRun> runs_, surface_runs_;  // of elements_; of all that carry points
