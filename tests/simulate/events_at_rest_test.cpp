@@ -5,7 +5,6 @@
 #include "base/error.h"
 #include "formats/lattice/body_file.h"
 #include "formats/lattice/fused_points.h"
-#include "formats/lattice/stress_columns.h"
 #include "simulate/scene/scene.h"
 #include "simulate/scene/strength.h"
 #include "tests/scratch.h"
@@ -135,7 +134,6 @@ TEST(EventsAtRest, SharesOfTheMaterialsYieldAreNotToldOfEditedParts) {
   const auto share = [](const std::string& event) {
     Body body = resting_bar();
     const SimulateResult result = simulate_quietly(body, rest_scene("yield = \"1 kPa\"\n" + kPulled + event));
-    EXPECT_EQ(body.surface.vertex_columns.contains(kYieldColumn), result.stress->yield_share.has_value());
     std::vector<std::string> unknown;
     const std::vector<Material> materials(1, {"gum", 1e6, 0.3, 1000, "", 1e3});
     EXPECT_EQ(nearest_to_strength(body, materials, unknown).has_value(),
