@@ -9,6 +9,7 @@
 #include "simulate/scene/strength.h"
 #include "tests/scratch.h"
 #include "tests/simulate/box_body.h"
+#include "tests/simulate/centre_body.h"
 #include "tests/simulate/scene_case.h"
 
 namespace flexel::simulate {
@@ -156,6 +157,17 @@ TEST(EventsAtRest, ADamagedBodyIsNotAdded) {
   write_body(damaged, path);
   const std::string add = "[[event]]\ndo = \"add\"\nbody = \"" + path + "\"\n";
   EXPECT_THAT(refusal(resting_bar(), rest_scene(kPulled + add)), HasSubstr("damaged.vtu: column"));
+}
+
+// At centre placement no element lies at a surface: an edit of one would change nothing, and say that it did.
+TEST(EventsAtRest, ASurfaceOverNothingIsRefused) {
+  testing::CentreOptions options;
+  options.voxels = {4, 3, 3};
+  options.spacing = kBarCell;
+  const std::string hold = "[[fix]]\nwhere = \"xmin\"\n[gravity]\nacceleration = [0, 0, \"-1 m/s2\"]\n";
+  EXPECT_THAT(refusal(testing::centre_body(options),
+                      rest_scene(hold + "[[event]]\ndo = \"edit\"\nwhere = \"xmax\"\nstiffness = 2\n")),
+              HasSubstr("surface only"));
 }
 
 TEST(EventsAtRest, AVelocityIsOfTimedRuns) {
