@@ -263,8 +263,9 @@ void refuse(const Body& body) {
     for (const auto& [name, column] : *columns)
       if (!is_stress_column(name) && name != "velocity" && name != kQuadraticColumn &&
           name != kTemperatureColumn)
-        throw InputError(fmt::format("the body remembers an earlier run (\"{}\")", name));
-  if (body.notes.contains(kFusedNote)) throw InputError("an earlier run fused points of the body");
+        throw InputError(fmt::format("the body remembers an earlier run or an event (\"{}\")", name));
+  if (body.notes.contains(kFusedNote))
+    throw InputError("an earlier run or an event fused points of the body");
   for (const Part& part : body.parts) {
     if (part.placement == Placement::centre)
       throw InputError(fmt::format("part \"{}\" has its elements at the voxels' centres", part.name));

@@ -40,6 +40,7 @@ std::vector<std::string> Add::prepare() {
   refuse_device(path_, origin_);
   try {
     body_ = read_body(path_);
+    refuse_damaged_columns(body_);
   } catch (const InputError& error) {
     throw InputError(origin_,
                      "\"body\" " + (error.where().empty() ? path_ : error.where()) + ": " + error.what());
@@ -50,6 +51,9 @@ std::vector<std::string> Add::prepare() {
 }
 
 std::string Add::apply(EventContext& context) const {
+  if (velocity_ && !context.problem.duration)
+    throw InputError(origin_,
+                     "add: \"velocity\" is of timed runs: give [run] time = \"1 s\", or leave it out");
   Body other = body_;
   State state = state_of(other);
   if (velocity_) state.velocity.assign(other.element_count(), *velocity_);

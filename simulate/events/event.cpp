@@ -3,7 +3,27 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "base/error.h"
+
 namespace flexel::simulate {
+namespace {
+
+// A surface over nothing, as that of parts at centre placement, has polygons alone.
+Chosen refuse_bare_surface(Chosen chosen, const Selection& where) {
+  const auto any = [](const std::vector<std::uint8_t>& of) {
+    return std::find(of.begin(), of.end(), 1) != of.end();
+  };
+  if (!any(chosen.elements) && !any(chosen.cells))
+    throw InputError(where.origin,
+                     fmt::format("{} has no elements and no cells that an event could change, surface "
+                                 "only: give \"where\" a box, a sphere, a half-space or a part",
+                                 describe(where)));
+  return chosen;
+}
+
+}  // namespace
 
 EventRegion parse_region(TableReader& reader) {
   EventRegion region;
@@ -36,14 +56,14 @@ Chosen choose(const EventRegion& region, const Body& body, const State& state) {
     for (const std::uint32_t e : body.cell_elements[c]) inside += chosen.elements[e];
     chosen.cells[c] = inside > 4;
   }
-  if (body.surface_cell_offsets.empty()) return chosen;
+  if (body.surface_cell_offsets.empty()) return refuse_bare_surface(std::move(chosen), *region.where);
   for (const std::uint32_t polygon : selected.polygons)
     for (std::uint32_t i = body.surface_cell_offsets[polygon]; i < body.surface_cell_offsets[polygon + 1];
          ++i) {
       chosen.cells[body.surface_cells[i]] = 1;
       for (const std::uint32_t e : body.cell_elements[body.surface_cells[i]]) chosen.elements[e] = 1;
     }
-  return chosen;
+  return refuse_bare_surface(std::move(chosen), *region.where);
 }
 
 }  // namespace flexel::simulate

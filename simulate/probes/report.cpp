@@ -17,6 +17,7 @@
 #include "simulate/input/infill.h"
 #include "simulate/models/connections.h"
 #include "simulate/models/rest_shape.h"
+#include "simulate/scene/strength.h"
 
 namespace flexel::simulate {
 
@@ -163,14 +164,21 @@ void measure_stress(const Problem& problem, const State& state, Body& body, Simu
 
 namespace {
 
-// Of the surface's vertices, where a part's material has a `yield`.
-void write_yield_shares(const std::vector<Material>& materials, const std::vector<SymmetricStress>& vertex,
+// (parts) Pa; 0: none, or edits changed it.
+std::vector<double> yields_of_parts(const Body& body, const std::vector<Material>& materials) {
+  std::vector<double> yields;
+  for (std::size_t p = 0; p < body.parts.size(); ++p)
+    yields.push_back(has_edited_limits(body, body.parts[p]) ? 0 : materials[p].yield);
+  return yields;
+}
+
+// Of the surface's vertices, where a part has a yield stress.
+void write_yield_shares(const std::vector<double>& yields, const std::vector<SymmetricStress>& vertex,
                         Surface& surface) {
-  if (std::none_of(materials.begin(), materials.end(), [](const Material& each) { return each.yield > 0; }))
-    return;
+  if (std::none_of(yields.begin(), yields.end(), [](double each) { return each > 0; })) return;
   Column share{1, std::vector<double>(vertex.size(), -1)};
   for (std::size_t p = 0; p < surface.polygon_count(); ++p)
-    if (const double yield = materials[surface.polygon_part(p)].yield; yield > 0)
+    if (const double yield = yields[surface.polygon_part(p)]; yield > 0)
       for (const std::uint32_t v : surface.polygon(p)) share.values[v] = von_mises(vertex[v]) / yield;
   surface.vertex_columns[kYieldColumn] = std::move(share);
 }
@@ -180,12 +188,13 @@ void write_yield_shares(const std::vector<Material>& materials, const std::vecto
 void report_stress(const Problem& problem, const Stresses& stresses, Body& body, SimulateResult& result) {
   const std::optional<LargestStress> largest = largest_stress(body, stresses);
   if (!largest) return;
-  const double yield = problem.materials[largest->part].yield;
+  const std::vector<double> yields = yields_of_parts(body, problem.materials);
   result.stress = StressSummary{largest->value, largest->at, body.parts[largest->part].name, {}};
   result.stress->doubt = largest->doubt;
-  if (yield > 0) result.stress->yield_share = largest->value / yield;
+  if (const double yield = yields[largest->part]; yield > 0)
+    result.stress->yield_share = largest->value / yield;
   write_stress_columns(stresses, body);
-  if (!stresses.vertex.empty()) write_yield_shares(problem.materials, stresses.vertex, body.surface);
+  if (!stresses.vertex.empty()) write_yield_shares(yields, stresses.vertex, body.surface);
 }
 
 void sum_up_imbalance(SimulateResult& result) {

@@ -19,6 +19,17 @@ std::uint32_t most_stressed(const Part& part, const std::vector<double>& stress)
 
 }  // namespace
 
+bool has_edited_limits(const Body& body, const Part& part) {
+  for (const char* name : {"stiffness_change", "yield_change", "strength_change"}) {
+    const auto column = body.cell_columns.find(name);
+    if (column == body.cell_columns.end()) continue;
+    const auto begin = column->second.values.begin();
+    if (std::any_of(begin + part.cell_begin, begin + part.cell_end, [](double each) { return each != 0; }))
+      return true;
+  }
+  return false;
+}
+
 std::optional<StrengthSummary> nearest_to_strength(const Body& body, const std::vector<Material>& materials,
                                                    std::vector<std::string>& unknown) {
   const auto column = body.element_columns.find("von_mises");
@@ -31,7 +42,7 @@ std::optional<StrengthSummary> nearest_to_strength(const Body& body, const std::
     if (part.element_begin == part.element_end) continue;
     const double limit = material.yield > 0 ? material.yield : material.strength;
     // along and across the grain strengths differ many times over: one number says nothing of the nearest
-    if (!(limit > 0) || material.law == LawName::orthotropic) {
+    if (!(limit > 0) || material.law == LawName::orthotropic || has_edited_limits(body, part)) {
       if (std::find(unknown.begin(), unknown.end(), material.name) == unknown.end())
         unknown.push_back(material.name);
       continue;

@@ -21,9 +21,14 @@ struct StrengthSummary {   // of the part that is nearest to what its material b
   std::optional<double> layer_share = {};  // of the strength of a print across its layers
 };
 
+// Whether an edit changed what cells of the part bear, by "stiffness", "yield" or "strength"
+// (docs/reference/events.md): shares of what the material bears would then say nothing.
+[[nodiscard]] bool has_edited_limits(const Body& body, const Part& part);
+
 // The part whose largest von Mises stress (column "von_mises" of the elements) is the greatest share of its
 // material's yield stress, or of its strength where no yield stress is known. Nothing where no part has
-// either, or no stresses. `materials` (parts). `unknown` gets the names of materials that have neither.
+// either, or no stresses. `materials` (parts). `unknown` gets the names of materials that have neither, and of
+// parts with edited limits.
 [[nodiscard]] std::optional<StrengthSummary> nearest_to_strength(const Body& body,
                                                                  const std::vector<Material>& materials,
                                                                  std::vector<std::string>& unknown);

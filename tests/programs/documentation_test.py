@@ -1,4 +1,4 @@
-"""Every command in a ```sh block of README.md, docs/ and samples/README.md works as it stands; samples_test.py has the pages of the samples.
+"""Every command in a ```sh block of README.md, docs/ and samples/README.md works as it stands; paper_test.py has the pages of the samples.
 
 The blocks of a page run one after another in one shell (`bash -eu -o pipefail`), in a folder that looks like the repository after
 tools/demo: build/release/bin, samples and out/bracket.step are there. A block that is not to be run is fenced ```text.

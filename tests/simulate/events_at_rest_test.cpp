@@ -6,8 +6,10 @@
 #include "formats/lattice/body_file.h"
 #include "formats/lattice/fused_points.h"
 #include "simulate/scene/scene.h"
+#include "simulate/scene/strength.h"
 #include "tests/scratch.h"
 #include "tests/simulate/box_body.h"
+#include "tests/simulate/centre_body.h"
 #include "tests/simulate/scene_case.h"
 
 namespace flexel::simulate {
@@ -126,6 +128,57 @@ TEST(EventsAtRest, TheyComeBeforeARunThatSettlesToo) {
     return (body.position.back() - body.rest.back()).z();
   };
   EXPECT_NEAR(sag("[[event]]\ndo = \"edit\"\nstiffness = 2\n"), 0.5 * sag(""), 2e-3 * std::abs(sag("")));
+}
+
+// What edits make of the yield stress is not the material's: no share of it is told.
+TEST(EventsAtRest, SharesOfTheMaterialsYieldAreNotToldOfEditedParts) {
+  const auto share = [](const std::string& event) {
+    Body body = resting_bar();
+    const SimulateResult result = simulate_quietly(body, rest_scene("yield = \"1 kPa\"\n" + kPulled + event));
+    std::vector<std::string> unknown;
+    const std::vector<Material> materials(1, {"gum", 1e6, 0.3, 1000, "", 1e3});
+    EXPECT_EQ(nearest_to_strength(body, materials, unknown).has_value(),
+              result.stress->yield_share.has_value());
+    EXPECT_EQ(unknown.empty(), result.stress->yield_share.has_value());
+    return result.stress->yield_share;
+  };
+  EXPECT_GT(share("").value_or(0), 0);
+  EXPECT_TRUE(share("[[event]]\ndo = \"edit\"\ndensity = 2\n").has_value());
+  for (const char* what : {"yield", "strength", "stiffness"})
+    EXPECT_FALSE(share(std::string("[[event]]\ndo = \"edit\"\n") + what + " = 0.5\n").has_value()) << what;
+}
+
+// Before anything is written into its columns.
+TEST(EventsAtRest, ADamagedBodyIsNotAdded) {
+  const flexel::test::Scratch scratch;
+  const std::string path = scratch.path("damaged.vtu");
+  Body damaged = resting_bar("other", Vec3(0.1, 0, 0));
+  damaged.element_columns["connection_rest"] = {1, std::vector<double>(damaged.element_count(), 0)};
+  write_body(damaged, path);
+  const std::string add = "[[event]]\ndo = \"add\"\nbody = \"" + path + "\"\n";
+  EXPECT_THAT(refusal(resting_bar(), rest_scene(kPulled + add)), HasSubstr("damaged.vtu: column"));
+}
+
+// At centre placement no element lies at a surface: an edit of one would change nothing, and say that it did.
+TEST(EventsAtRest, ASurfaceOverNothingIsRefused) {
+  testing::CentreOptions options;
+  options.voxels = {4, 3, 3};
+  options.spacing = kBarCell;
+  const std::string hold = "[[fix]]\nwhere = \"xmin\"\n[gravity]\nacceleration = [0, 0, \"-1 m/s2\"]\n";
+  EXPECT_THAT(refusal(testing::centre_body(options),
+                      rest_scene(hold + "[[event]]\ndo = \"edit\"\nwhere = \"xmax\"\nstiffness = 2\n")),
+              HasSubstr("surface only"));
+}
+
+TEST(EventsAtRest, AVelocityIsOfTimedRuns) {
+  const flexel::test::Scratch scratch;
+  const std::string path = scratch.path("other.vtu");
+  write_body(resting_bar("other", Vec3(0.1, 0, 0)), path);
+  EXPECT_THAT(refusal(resting_bar(), rest_scene(kPulled +
+                                                "[[event]]\ndo = \"add\"\nvelocity = [\"1 m/s\", 0, 0]\nbody "
+                                                "= \"" +
+                                                path + "\"\n")),
+              HasSubstr("\"velocity\" is of timed runs"));
 }
 
 TEST(EventsAtRest, ModelQuadraticRefusesThem) {
