@@ -11,6 +11,8 @@ namespace flexel::simulate {
 // LDL^T (supernodes, left-looking: Ng and Peyton 1993; approximate minimum degree) of a symmetric matrix whose diagonal is
 // raised by one part in 1e9. Pivots count by magnitude, so that the solution operator is positive definite whatever
 // the matrix. Serial: the same bits for any thread count.
+// Why no library's: Eigen's LDL^T has no supernodes, CHOLMOD has them for positive definite matrices alone (LL^T), by a BLAS whose
+// bits differ between processors; and neither can be stopped.
 class DirectSolver {
  public:
   // Takes the lower half. The pattern of a second call must be that of the first. May be stopped (base/stop.h), and is to be called

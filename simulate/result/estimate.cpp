@@ -63,10 +63,13 @@ std::optional<Bar> field_stress_bar(const Sequence& s, std::size_t lattices, dou
   const double e21 = std::abs(s.value[1] - s.value[0]), e32 = std::abs(s.value[2] - s.value[1]);
   if (singular && std::max(e21, e32) > kHardlyDiffer * std::abs(s.value[0])) return std::nullopt;
   // A notch of a cell or two: the peak begins to show, and the values are not near a limit yet.
-  const bool grows = s.value[0] > s.value[1] && s.value[1] > s.value[2] && e21 > e32;
+  const bool grows = s.value[0] > s.value[1] && s.value[1] > s.value[2] &&
+                     e21 * std::log(s.ratio[1]) > e32 * std::log(s.ratio[0]);
+  // Of lattices less than twice as coarse: what a step to one twice as coarse would differ by, at least at order 1.
+  const double finer = e21 / std::min(1.0, s.ratio[0] - 1);
   const double lattice =
       lattices < 3 ? kWideSafety * e21
-                   : std::max((grows ? kGrowingSafety : 1) * e21, e32 / std::pow(s.ratio[0], kModelOrder));
+                   : std::max((grows ? kGrowingSafety : 1) * finer, e32 / std::pow(s.ratio[0], kModelOrder));
   return Bar{std::max(lattice, kDoubtSafety * doubt), s.value[0], std::nullopt};
 }
 

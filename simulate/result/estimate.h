@@ -40,7 +40,7 @@ struct Bar {
 
 // Of the largest stress in model `quadratic`: the largest of the finer difference (2.25 times it, where values grow by more each time), a quarter of
 // the coarser one (what order 2 leaves of it) and 1.5 times `doubt` [Pa], by which the field of one cell is off from that of the cells around.
-// With two lattices three times the difference. Nothing at a `singular` place, but where values hardly differ.
+// Where the finer ratio r is under 2 the finer difference counts 1 / (r - 1) times (order 1). With two lattices three times the difference. Nothing at a `singular` place, but where values hardly differ.
 [[nodiscard]] std::optional<Bar> field_stress_bar(const Sequence& sequence, std::size_t lattices,
                                                   double doubt, bool singular);
 

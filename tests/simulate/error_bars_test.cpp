@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -79,13 +80,18 @@ TEST(StressBar, OfAFieldIsTheLargestDoubt) {
 
 // A peak that cells of h begin to see, 1 / (1 + (h / r)^2) of 1: the bar holds it wherever the notch is wider than a cell.
 TEST(StressBar, OfAFieldHoldsAPeakThatBeginsToShow) {
-  for (double h = 0.05; h < 1; h *= 1.1) {
-    const auto peak = [&](double cell) { return 1 / (1 + cell * cell); };
-    const double value = peak(h);
-    const auto bar = field_stress_bar({{value, peak(2 * h), peak(4 * h)}, {2, 2}}, 3, 0, false);
-    EXPECT_GE(bar->half_width, 1 - value) << h;
-    EXPECT_LE(bar->half_width, 5 * (1 - value)) << h;
-  }
+  using Ratio = std::array<double, 2>;
+  for (const Ratio& ratio : {Ratio{2, 2}, Ratio{1.5, 1.5}, Ratio{1.5, 2}, Ratio{1.5, 3}, Ratio{1.75, 2},
+                             Ratio{2, 1.5}, Ratio{3, 2}})
+    for (double h = 0.05; h < 1; h *= 1.1) {
+      const auto peak = [&](double cell) { return 1 / (1 + cell * cell); };
+      const double value = peak(h);
+      const Sequence seen{{value, peak(ratio[0] * h), peak(ratio[0] * ratio[1] * h)}, ratio};
+      const auto bar = field_stress_bar(seen, 3, 0, false);
+      EXPECT_GE(bar->half_width, 1 - value) << h << ", ratios " << ratio[0] << " and " << ratio[1];
+      EXPECT_LE(bar->half_width, (ratio == Ratio{2, 2} ? 5 : 9) * (1 - value))
+          << h << ", ratios " << ratio[0] << " and " << ratio[1];
+    }
 }
 
 TEST(StressBar, HoldsTheLimitOrThereIsNone) {
