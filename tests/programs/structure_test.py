@@ -1,5 +1,6 @@
 """What the design fixes about the code itself: who includes whom, what the programs link, sizes, no machine's paths."""
 
+import os
 import pathlib
 import re
 import shutil
@@ -247,6 +248,13 @@ def test_sources_open_with_a_comment():
     wrong = [str(path.relative_to(SOURCE)) for folder in CODE for path in code_files(folder)
              if not path.read_text(encoding="utf-8").startswith("//")]
     expect(not wrong, f"files that do not say what they are: {wrong}")
+
+
+def test_what_names_its_interpreter_can_be_run():
+    scripts = [path for path in tracked_files() if path.read_bytes()[:2] == b"#!"]
+    expect(len(scripts) > 20, f"{len(scripts)} scripts")
+    wrong = [str(path.relative_to(SOURCE)) for path in scripts if not os.access(path, os.X_OK)]
+    expect(not wrong, f"scripts that the shell refuses to run (chmod +x): {wrong}")
 
 
 def test_changelog_names_this_version():
