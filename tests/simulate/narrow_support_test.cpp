@@ -80,7 +80,7 @@ TEST(NarrowSupport, IsToldByWhatItIs) {
       support_under_two_cells(body, scene),
       "the support \"ring: inner\" is narrow (a strip of its area and rim is 500 mm wide, under two cells)");
   scene.get<Supports>().ties.front().link.emplace();
-  EXPECT_THAT(support_under_two_cells(body, scene), testing::StartsWith("the rigid link \"ring: inner\""));
+  EXPECT_THAT(support_under_two_cells(body, scene), ::testing::StartsWith("the rigid link \"ring: inner\""));
   body.parts.front().lattice.spacing = Vec3::Constant(0.25);
   EXPECT_EQ(support_under_two_cells(body, scene), "") << "two cells";
   body.parts.front().lattice.spacing = Vec3::Constant(0.4);
