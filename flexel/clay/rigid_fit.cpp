@@ -1,4 +1,4 @@
-// The rotation is V diag(1, 1, det(V U^T)) U^T of the covariance U S V^T.
+// The rotation is the one nearest to the covariance of where points are and where they were (Kabsch 1976).
 #include "flexel/clay/rigid_fit.h"
 
 #include <Eigen/Geometry>

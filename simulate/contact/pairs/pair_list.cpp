@@ -8,8 +8,7 @@ namespace flexel::simulate {
 namespace {
 
 constexpr double kSkin = 0.4;         // margin, of the widest spacing
-constexpr double kSlack = 0.45;       // of the margin; not quite half: weights
-                                      // outside [0, 1] carry a point further
+constexpr double kSlack = 0.45;       // of the margin; not quite half: weights may lie outside [0, 1]
 constexpr double kTurning = 0.4;      // by which the cosine between normals may change meanwhile
 constexpr double kOpposite = 0.9998;  // cosine of 1 degree, from which faces are as parts of one plane
 constexpr double kBendReach = 3;      // spacings, within which a curved surface turns; its facets may be long
@@ -78,9 +77,9 @@ double PairList::way(const State& before, const State& aimed) const {
   return moves.diagonal();
 }
 
-// Half the diagonal of the box of the moves since the list was made bounds them
-// but for a common one. The next step's are in their box widened by that of the
-// velocities: the length of a step is chosen before it leads to an impact.
+// Half the diagonal of the box of the moves since the list was made bounds them but for a common one. The next
+// step's are in their box widened by that of the velocities: the length of a step is chosen before it leads to
+// an impact.
 bool PairList::is_due(const State& state, bool ahead, double way) {
   constexpr std::size_t kGrain = 1024;
   boxes_.assign((surface_runs_.size() + kGrain - 1) / kGrain, {});
@@ -147,9 +146,8 @@ void PairList::build(const State& state) {
   number_points();
 }
 
-// Of parts that may touch themselves or whose boxes are near one another. Where
-// there are none, more slack: `farthest` [m] bounds the distance of two points
-// that touch.
+// Of parts that may touch themselves or whose boxes are near one another. Where there are none, more slack:
+// `farthest` [m] bounds the distance of two points that touch.
 std::vector<std::uint32_t> PairList::points_of_near_parts(const std::vector<Vec3>& positions,
                                                           double farthest) {
   const std::vector<ContactPoint>& points = surface_.points();
@@ -157,8 +155,7 @@ std::vector<std::uint32_t> PairList::points_of_near_parts(const std::vector<Vec3
   for (std::size_t i = 0; i < points.size(); ++i) box[points[i].part].add(positions[i]);
   std::vector<std::uint8_t> near(box.size(), 0);
   for (std::uint32_t p = 0; p < near.size(); ++p) near[p] = settings_.self && !surface_.rigid(p);
-  double nearest = std::numeric_limits<double>::infinity();  // m, between boxes
-                                                             // that are apart
+  double nearest = std::numeric_limits<double>::infinity();  // m, between boxes that are apart
   for (std::size_t a = 0; a < box.size(); ++a)
     for (std::size_t b = a + 1; b < box.size(); ++b) {
       if (box[a].empty() || box[b].empty()) continue;
