@@ -37,6 +37,7 @@
 #include "simulate/input/infill.h"
 #include "simulate/quadratic/quadratic_run.h"
 #include "simulate/result/options.h"
+#include "simulate/result/overload.h"
 #include "simulate/scene/strength.h"
 #include "simulate/simulate.h"
 #include "simulate/summary.h"
@@ -347,6 +348,8 @@ class GoalRuns {
       return size_of(*made_);
     } catch (const InputError& error) {
       if (!model_.take_back(error.what())) throw;
+    } catch (const simulate::OverloadError&) {
+      throw;
     } catch (const DivergedError& error) {
       if (!model_.take_back(error.what())) throw;
     } catch (const TimeoutError&) {
@@ -371,6 +374,7 @@ class GoalRuns {
   // bends may be thin though most of the matter is not.
   SolvedRun surer_of_two(SolvedRun run) {
     constexpr double kRough = 0.2;
+    constexpr double kSideTrial = 0.15;  // of the time, which finer cells need as much
     if (run.given_up || !model_.may_be_other()) return run;
     std::vector<SolvedRun> first;
     first.push_back(std::move(run));
@@ -380,7 +384,7 @@ class GoalRuns {
     const mapping::MapOptions map = plan_.map;
     std::string why_not;
     try {
-      const StopAfter limit(patience(), "--within");
+      const StopAfter limit(patience(kSideTrial, kSideTrial), "--within");
       std::vector<SolvedRun> other;
       const double size = made(std::nullopt).size;
       other.push_back(solve(size, [](std::size_t) { return true; }));
@@ -423,10 +427,10 @@ class GoalRuns {
   }
 
   // s, for the first answer of a model that nobody asked for.
-  [[nodiscard]] double patience() const {
-    constexpr double kShare = 0.3, kUsualShare = 0.45, kUsual = 30;
+  [[nodiscard]] double patience(double share = 0.3, double usual_share = 0.45) const {
+    constexpr double kUsual = 30;  // s, without --within
     const AccuracyGoal& goal = *plan_.goal;
-    return (goal.by_default ? kUsualShare * slowed_by_others(goal.began) : kShare) *
+    return (goal.by_default ? usual_share * slowed_by_others(goal.began) : share) *
            goal.within.value_or(kUsual);
   }
   // No more than --max-elements and --max-memory let pass.
