@@ -135,6 +135,14 @@ void TimedRun::begin() {
   if (!stuck.empty()) start_.transferred_states = {{Contact::name, transfer_of(stuck)}};
   segment_.emplace(body_, scene_, options_, progress_, start_, state_of(body_));
   start_.transferred_states.clear();
+  if (!stuck.empty() && !scene_.get<Contact>().sticks()) {
+    progress_.warn(
+        fmt::format("{}: {} places of surfaces stuck together at the end of an earlier run; nothing of this "
+                    "scene has stick, "
+                    "and they come off: stick in its [contact] keeps them",
+                    scene_.name, stuck.size()));
+    return;
+  }
   std::size_t found = 0;
   for (const auto& [name, transferred] : segment_->transferred_states())
     if (name == Contact::name) found = stuck_in(transferred).size();
