@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <tuple>
 
 #include "base/error.h"
@@ -43,6 +44,52 @@ void add_stick(Body& body, const std::vector<std::uint8_t>& chosen, double more)
     if (chosen[e]) column.values[e] += more;
 }
 
+// Rows of `chosen` that the column does not name yet; it names them then.
+void take_unmarked(Columns& columns, const std::string& name, std::vector<std::uint8_t>& chosen) {
+  if (chosen.empty()) return;
+  Column& column = columns[name];
+  if (column.components != 1 || column.values.size() != chosen.size())
+    column = {1, std::vector<double>(chosen.size(), 0)};
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    if (column.values[i] != 0) chosen[i] = 0;
+    if (chosen[i]) column.values[i] = 1;
+  }
+}
+
+// What an event that happens again and again has edited, by a column that is there between its first and its last time.
+class EditedAlready {
+ public:
+  EditedAlready(EventContext& context, const std::string& origin)
+      : context_(context), column_("edited_" + origin.substr(origin.rfind(':') + 1)) {
+    if (context_.turn == 0) forget();
+  }
+  EditedAlready(const EditedAlready&) = delete;
+  EditedAlready& operator=(const EditedAlready&) = delete;
+  ~EditedAlready() {
+    if (context_.turn + 1 == context_.turns) forget();
+  }
+  void leave_out(Chosen& chosen) {
+    if (context_.turns == 1) return;
+    take_unmarked(context_.body.cell_columns, column_, chosen.cells);
+    take_unmarked(context_.body.element_columns, column_, chosen.elements);
+  }
+
+ private:
+  void forget() {
+    context_.body.cell_columns.erase(column_);
+    context_.body.element_columns.erase(column_);
+  }
+  EventContext& context_;
+  std::string column_;
+};
+
+bool holds_any(const Chosen& chosen) {
+  const auto any = [](const std::vector<std::uint8_t>& of) {
+    return std::find(of.begin(), of.end(), 1) != of.end();
+  };
+  return any(chosen.cells) || any(chosen.elements);
+}
+
 constexpr std::size_t kConnectionsOfElement = half_neighbourhood.size();
 
 // A column of connections, 0 where it has not been.
@@ -79,6 +126,8 @@ Edit Edit::parse(TableReader& reader) {
   made.radius_ = factor(reader, "radius");
   made.stick_ = reader.quantity("stick", Dimension::pressure).value_or(0);
   made.origin_ = reader.place();
+  if (made.of_ != Of::elements && reader.find("every"))
+    reader.fail(reader.find("every")->line, "connections are edited once: leave \"every\" out");
   if (made.of_ == Of::elements && made.length_ != 1)
     reader.fail("\"length\" is that of connections: give \"connections\" = \"inside\" or \"across\" too");
   if (made.of_ != Of::elements && made.changes_elements_only())
@@ -133,8 +182,12 @@ std::string Edit::edit_connections(EventContext& context, const Chosen& chosen) 
 }
 
 std::string Edit::apply(EventContext& context) const {
-  const Chosen chosen = choose(region_, context.body, context.state);
+  EditedAlready edited(context, origin_);  // a tool may pass twice
+  Chosen chosen = choose(region_, context.body, context.state);
   if (of_ != Of::elements) return edit_connections(context, chosen);
+  edited.leave_out(chosen);
+  if (!holds_any(chosen))
+    throw EmptySelectionError(origin_, fmt::format("all of {} was edited already", describe(region_)));
   std::vector<std::uint8_t> elements = chosen.elements;
   for (const Part& part : context.body.parts)
     if (part.placement == Placement::corner)

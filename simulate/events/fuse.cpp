@@ -262,7 +262,7 @@ std::string Fuse::apply(EventContext& context) const {
   const std::size_t points = fuse_parts(context, chosen, now, within_);
   const std::size_t cells = heal(context, chosen, now, within_);
   if (points + cells == 0)
-    throw InputError(
+    throw EmptySelectionError(
         origin_,
         fmt::format("fuse: in {} nothing of one part is within {} of another (at centre placement from "
                     "element to element), and no broken cell is nearly whole",

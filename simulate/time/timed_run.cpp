@@ -18,6 +18,7 @@
 #include "formats/lattice/fused_points.h"
 #include "simulate/contact/pairs/stuck_places.h"
 #include "simulate/effects/contact.h"
+#include "simulate/events/repeated_events.h"
 #include "simulate/live/live_link.h"
 #include "simulate/models/damping_factors.h"
 #include "simulate/models/rest_shape.h"
@@ -83,7 +84,8 @@ class TimedRun {
   std::optional<Checkpoint> kept_;  // with --checkpoint: where the run can go on from
   Bytes act_body_;                  // likewise: the body as the present act began, to be made with it
   std::chrono::steady_clock::time_point saved_ = began_;
-  std::size_t events_ = 0;      // that have happened
+  std::size_t events_ = 0;  // that have happened
+  RepeatedEvents repeated_;
   std::size_t frames_ = 0;      // so far
   bool at_whole_step_ = false;  // velocities are of the time of the state, after an event
   double next_row_ = 0, next_frame_ = 0;
@@ -357,9 +359,10 @@ void TimedRun::apply(std::size_t end) {
   for (; events_ < end; ++events_) {
     const Event& event = scene_.events[events_];
     const Problem problem = timed_problem(body_, scene_, start_);
-    EventContext context{body_, state, start_.fused, start_.settled, problem, progress_};
-    const std::string what = event.apply(context);
-    progress_.say(fmt::format("at {:.4g} s {}: {}", event.at, event.name, what));
+    EventContext context{body_,   state,     start_.fused, start_.settled,
+                         problem, progress_, event.turn,   event.turns};
+    const std::string what = repeated_.happen(event, context);
+    if (!what.empty()) progress_.say(fmt::format("at {:.4g} s {}: {}", event.at, event.name, what));
   }
   for (auto& [name, transferred] : start_.transferred_states)
     if (name == Contact::name)
