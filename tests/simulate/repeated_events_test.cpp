@@ -132,6 +132,22 @@ TEST(RepeatedEvents, WhatNeverMeetsAnythingIsToldOnce) {
   EXPECT_EQ(cells_of(body, 0).size(), 96u);
 }
 
+TEST(RepeatedEvents, ACarvingThatTakesNothingIsRefusedOrPassedOver) {
+  // It holds one element, and so less than half of any cell.
+  const std::string small =
+      "do = \"carve\"\nwhere = { sphere = { centre = [\"20 mm\", \"20 mm\", \"20 mm\"], radius = \"3 mm\" } "
+      "}\n";
+  try {
+    (void)run_scene(scene_with("[[event]]\nat = \"1 ms\"\n" + small));
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("no cell has more than half of its elements in sphere"));
+  }
+  const testing::TimedCase made =
+      run_scene(scene_with("[[event]]\nat = \"1 ms\"\nevery = \"2 ms\"\n" + small));
+  EXPECT_EQ(cells_of(made.body, 0).size(), 96u);
+}
+
 TEST(RepeatedEvents, WrongEntriesAreRefused) {
   const auto message = [](const std::string& event) -> std::string {
     try {
