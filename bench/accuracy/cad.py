@@ -3,13 +3,13 @@
 
     PATH=build/release/bin:$PATH bench/accuracy/cad.py [--parts ../shared/parts] [--held-out FOLDER] [--keep FOLDER] [-o FILE] [--again] [NAME ...]
 
-Each part is cut into some 6,000 cells (of an assembly with parts smaller than such a cell, as many as flexel-voxelize asks for), held over 6 % of its
-longest side at one end, and moved across by 20 % of that side at the other. `flexel-map -o bent.step` writes its faces; gmsh meshes the part and the
-result with tetrahedra of one size, a tenth of the longest side, or where it cannot in 40 s a 25th. Volumes: by how much that of gmsh's mesh changed,
-and that of the mapped triangles (`flexel-map --report`). Seconds: flexel-map, reading and mapping included, two threads. With names only these parts
-run, which the page says; with --again the page keeps its rows of the others. With --keep each row is written to FOLDER as soon as it is measured, and
-a later run takes it from there. The held-out parts of the page as it stands: all STEP files under 1.5 MB in three public repositories on GitHub,
-TheRobotStudio/SO-ARM100, tpaviot/pythonocc-demos and Kofferkulli/full-size-models, but for those in ../shared/parts; chosen before the first run.
+Each part is cut into some 6,000 cells, held over 6 % of its longest side at one end, and moved across by 20 % of that side at the other. `flexel-map
+-o bent.step` writes its faces; gmsh meshes the part and the result with tetrahedra of one size, a tenth of the longest side, or where it cannot in 40
+s a 25th. Volumes: by how much that of gmsh's mesh changed, and that of the mapped triangles (`flexel-map --report`). Seconds: flexel-map, reading and
+mapping included, two threads. With names only these parts run, which the page says; with --again the page keeps its rows of the others. With --keep
+each row is written to FOLDER as soon as it is measured, and a later run takes it from there. The held-out parts of the page as it stands: all STEP
+files under 1.5 MB in three public repositories on GitHub, TheRobotStudio/SO-ARM100, tpaviot/pythonocc-demos and Kofferkulli/full-size-models, but for
+those in ../shared/parts; chosen before the first run.
 """
 
 import argparse
@@ -89,10 +89,7 @@ def measure(part, cwd):
     row = {"part": part.name}
     scene, longest, diagonal = scene_of(*box_of(part, cwd))
     (cwd / "scene.toml").write_text(scene)
-    voxelize = lambda *size: run("flexel-voxelize", part, *size, "-o", "rest.vtu", "--quiet", cwd=cwd)
-    code, said, _ = voxelize("--count", CELLS)
-    if code != 0 and (finer := re.search(r'larger than .*--size "(.*?)"', said)):
-        code, said, _ = voxelize("--size", finer[1])
+    code, said, _ = run("flexel-voxelize", part, "--count", CELLS, "-o", "rest.vtu", "--quiet", cwd=cwd)
     if code == 0:
         code, said, _ = run("flexel-simulate", "scene.toml", "rest.vtu", "-o", "bent.vtu", "--no-estimate", cwd=cwd)
     if code != 0:
