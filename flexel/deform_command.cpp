@@ -235,10 +235,12 @@ std::vector<mapping::CadAnswer> write_outputs(const DeformArguments& arguments, 
     write_parts(mapped.surface(body), mapped.result.displacement, plan.crack.pieces_format,
                 default_unit(body.surface), plan.crack.pieces);
   const auto cad = [](const Plan::Output& output) { return output.surface && is_cad(*output.surface); };
-  std::vector<mapping::CadAnswer> answers;
-  for (const Plan::Output& output : plan.outputs)  // first, for --strict may end the run here
-    if (cad(output))
-      answers.push_back(write_cad(body, mapped.report, arguments.map, plan.map, *output.surface, progress));
+  std::vector<mapping::MapOutput> cad_outputs;
+  for (const Plan::Output& output : plan.outputs)
+    if (cad(output)) cad_outputs.push_back(*output.surface);
+  // first, for --strict may end the run here
+  std::vector<mapping::CadAnswer> answers =
+      write_cad(body, mapped.report, arguments.map, plan.map, cad_outputs, progress);
   for (const Plan::Output& output : plan.outputs)
     if (cad(output) || output.is_page())  // pages come last: they say what the run said
       continue;

@@ -74,6 +74,48 @@ def test_one_run_tells_the_faces_it_wrote():
         expect(abs(file["volume_after"] * 1e9 / volume(file["file"]) - 1) < 1e-3, f"{file}")
 
 
+def test_several_cad_files_of_one_run_are_one_fit():
+    part = bracket()
+    words = ("flexel", "deform", part, "--material", "pla", "--fix", "bracket/1", "--push", "bracket/2: 0 0 -200 N", "--size", "4mm", "--no-estimate", "--quiet")
+    expect_ok(run(*words, "-o", "alone.igs"))
+    expect_ok(run(*words, "-o", "bent.step", "-o", "bent.brep", "-o", "again.step", "-o", "bent.igs"))
+    read = lambda name: pathlib.Path(name).read_bytes()
+    expect(read("bent.step") == read("again.step"), "one format, one file")
+    expect(read("bent.igs") == read("alone.igs"), "what else is written changes nothing")
+    expect(abs(volume("bent.brep") / volume("bent.step") - 1) < 1e-6, "the same solid")
+    said = expect_ok(run(*words[:-1], "--verbose", "-o", "bent.step")).err
+    expect(said.count("also when read again") == 1, f"said once: {said}")
+
+
+def test_of_a_brep_file_in_inches_each_format_has_its_own_unit():
+    need("gmsh")
+    expect_ok(run("gmsh", "-v", "1", "-0", write("inches.geo", 'SetFactory("OpenCASCADE"); Box(1) = {0, 0, 0, 4, 1, 1}; Save "inches.brep";\n')))
+    expect_ok(run("flexel", "deform", "inches.brep", "--unit", "in", "--material", "pla", "--fix", "xmin", "--push", "xmax: 0 0 -50 N", "--size", "5mm", "--no-estimate", "--quiet",
+                  "-o", "bent.step", "-o", "bent.brep"))
+    expect(abs(volume("bent.step") / volume("bent.brep") / 25.4**3 - 1) < 1e-4, f"{volume('bent.step')} mm^3, {volume('bent.brep')} in^3")
+
+
+def test_colours_and_levels_of_iges_come_out_again():
+    part = PARTS / "red_cube_blue_cylinder.step"
+    if not part.exists():
+        raise Skip("no real parts here")
+    bend = ("--material", "pla", "--fix", "zmin", "--push", "zmax: 30 0 0 N", "--count", "1500", "--no-estimate", "--quiet")
+    expect_ok(run("flexel", "deform", part, *bend, "-o", "first.igs"))
+    text = pathlib.Path("first.igs").read_text().splitlines()
+    entries = [i for i, line in enumerate(text) if line[72:73] == "D"]
+    for first in entries[::2]:  # the level is the fifth number of the first line
+        if text[first][:8].strip() == "144" or text[first][:8].strip() == "510":
+            text[first] = text[first][:32] + "7".rjust(8) + text[first][40:]
+    write("levels.igs", "\n".join(text) + "\n")
+    expect_ok(run("flexel", "deform", "levels.igs", *bend, "-o", "second.igs", "-o", "second.step", "-o", "second.ply"))
+    first, second = [sorted(re.findall(r"^314,([\d.]+)", pathlib.Path(name).read_text(), re.M)) for name in ("first.igs", "second.igs")]
+    expect(len(set(first)) >= 2 and set(second) == set(first), f"colours: {first} {second}")
+    step = pathlib.Path("second.step").read_text().replace("\n", "")
+    expect(len(re.findall(r"COLOUR_RGB\('[^']*',([^)]*)\)", step)) >= 2, "colours in STEP")
+    expect(re.findall(r"PRESENTATION_LAYER_ASSIGNMENT\('([^']*)'", step) == ["7"], "the level is a layer")
+    expect("property uchar red" in pathlib.Path("second.ply").read_text(errors="replace"), "colours of a mesh")
+
+
 def test_a_name_that_is_not_utf_8_is_a_name():
     bent()
     name = os.fsdecode(b"bent\xff.brep")

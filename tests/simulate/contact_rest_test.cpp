@@ -199,6 +199,45 @@ TEST(Contact, APinThatFillsAHoleFeelsNothingUntilItIsPushed) {
   }
 }
 
+// Facets do not press, the interference does: as a pin that just fits and swells by as much, let out or at once.
+TEST(Contact, APressFitPressesByItsInterference) {
+  constexpr double kRelease = 0.01;  // s
+  // N, around the pin, which is wider by `interference` [m] at rest and swells by `swelling` [m].
+  const auto pressed = [](double radius, double interference, double swelling, double release) {
+    Body body = prism(block("plate", {12, 12, 4}, Vec3(-6 * kSide, -6 * kSide, -0.5 * kSide)), 40, 5 * kSide,
+                      radius, 0, 3 * kSide);
+    append(body, prism(block("pin", {8, 8, 8}, Vec3(-4 * kSide, -4 * kSide, -2.5 * kSide)), 40,
+                       radius + interference, 0, -1.2 * kSide, 4.1 * kSide));
+    const Problem problem = problem_of(body);
+    ContactSettings settings = all_parts(body);
+    settings.release_time = release;
+    Contacts contacts(settings, problem);
+    State state = starting_at_rest(body);
+    std::vector<Vec3> forces(body.element_count(), Vec3::Zero());
+    contacts.add_forces(state, forces);
+    state.time = release;
+    const auto across = [&](std::uint32_t e) { return Vec3(body.rest[e].x(), body.rest[e].y(), 0); };
+    for (std::uint32_t e = body.parts[1].element_begin; e < body.parts[1].element_end; ++e)
+      state.displacement[e] = swelling / radius * across(e);
+    std::fill(forces.begin(), forces.end(), Vec3::Zero());
+    contacts.add_forces(state, forces);
+    double sum = 0;
+    for (std::uint32_t e = body.parts[1].element_begin; e < body.parts[1].element_end; ++e)
+      sum -= forces[e].dot(across(e).normalized());
+    return sum;
+  };
+  for (const double radius : {1.6 * kSide, 2.7 * kSide})
+    for (const double interference : {0.02 * kSide, 0.04 * kSide}) {
+      const double swollen = pressed(radius, 0, interference, 0);
+      EXPECT_GT(swollen, 0);
+      for (const double release : {0.0, kRelease}) {
+        EXPECT_NEAR(pressed(radius, interference, 0, release) / swollen, 1, 0.15)
+            << radius << " " << interference << " " << release;
+        EXPECT_LT(std::abs(pressed(radius, 0, 0, release)), 0.01 * swollen) << radius << " " << release;
+      }
+    }
+}
+
 // Its edge and its faces press, as those of one that comes from apart, but for pairs that come near when they are deep.
 TEST(Contact, ATiltedBoxThatBeginsInAFlatFacePresses) {
   struct Begins {
