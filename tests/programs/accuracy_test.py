@@ -100,12 +100,12 @@ def test_the_bar_of_a_load_on_a_narrow_region_holds():
 
 
 def test_within():
-    summary, said = deform([*beam(), "--within", "20s", "--verbose"])
+    summary, said = deform([*beam(), "--within", "10s", "--verbose"])
     told = summary["accuracy"]
     runs = told["runs"]
     # How long the last run really takes is up to who else is busy here; that it was to end in time is not.
-    expect(len(runs) > 1 and sum(run["seconds"] for run in runs[:-1]) + runs[-1]["predicted_seconds"] <= 20, told)
-    expect(told["met"] == (told["seconds"] <= 20) and "--within 20s" in said, told)
+    expect(len(runs) > 1 and sum(run["seconds"] for run in runs[:-1]) + runs[-1]["predicted_seconds"] <= 10, told)
+    expect(told["met"] == (told["seconds"] <= 10) and "--within 10s" in said, told)
     expect(runs[-1]["cells"] > 2 * runs[0]["cells"], told)
 
 
@@ -146,7 +146,7 @@ def test_by_default_a_size_is_chosen_and_said():
 
 def test_what_next_suggests_works():
     options = beam()
-    _, said = deform(options)
+    _, said = deform([*options, "--max-elements", "8000"])  # a rough answer: the next one takes a second, not half a minute
     words = box(said)["next"].split()
     asked = words[words.index("--accuracy") + 1]
     summary, _ = deform([*options, "--accuracy", asked])

@@ -49,7 +49,7 @@ def test_a_bolt_and_a_plate_are_bonded_or_in_contact_as_the_scene_says():
     need("gmsh")
     write("bolted.geo", BOLTED)
     run("gmsh", "bolted.geo", "-0", "-v", "1")
-    expect_ok(run("flexel-voxelize", "bolted.step", "--size", "1.5 mm", "-o", "body.vtu"))
+    expect_ok(run("flexel-voxelize", "bolted.step", "--size", "2 mm", "-o", "body.vtu"))
     plate, bolt = ("bolted", "bolted-2")
     expect(abs(moved("", 1, plate, bolt) - 1) < .2, "bonded, the plate comes along")
     expect(abs(moved("contact = true", 1, plate, bolt)) < .05, "in contact, the bolt lifts off")

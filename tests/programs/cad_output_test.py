@@ -236,8 +236,9 @@ def test_iges_and_brep_hold_the_same():
     wanted = volume("bent.step")
     for name in ("bent.igs", "bent.brep"):
         expect_ok(run("flexel-map", "bent.vtu", "-o", name, "--quiet"))
-        expect(abs(volume(name) / wanted - 1) < 1e-4, f"{name}: {volume(name)} {wanted}")
-        expect(len(faces(name)) == 11, f"{name}: {faces(name)}")
+        found, there = volume(name), faces(name)
+        expect(abs(found / wanted - 1) < 1e-4, f"{name}: {found} {wanted}")
+        expect(len(there) == 11, f"{name}: {there}")
     expect([each[2] for each in faces("bent.igs")] == [each[2] for each in faces("bracket.step")], "names of faces in IGES")
     for name in ("bent.igs", "bent.brep"):  # and they are sources in their turn
         bent(part=name, text='material = "pla"\n[[fix]]\nwhere = "zmax"\n[[move]]\nwhere = "zmin"\ndisplacement = ["3 mm", "0 mm", "0 mm"]\n', name="again.vtu")
@@ -329,7 +330,7 @@ def test_bytes_are_the_same_a_second_later():
     for turn in (1, 2):
         for kind in ("brep", "step", "igs"):
             expect_ok(run("flexel-map", "bent.vtu", "-o", f"bent{turn}.{kind}", "--quiet"))
-        time.sleep(1.1)
+        time.sleep(1.1 if turn == 1 else 0)
     for kind in ("brep", "step", "igs"):
         expect(pathlib.Path(f"bent1.{kind}").read_bytes() == pathlib.Path(f"bent2.{kind}").read_bytes(), f"bytes of {kind}")
 
@@ -341,11 +342,13 @@ def test_brep_in_other_units():
     scene(text=moved)
     expect_ok(run("flexel-voxelize", "bent.brep", "--unit", "cm", "--count", "3000", "-o", "rest.vtu", "--quiet"))
     expect_ok(run("flexel-simulate", "scene.toml", "rest.vtu", "-o", "big.vtu", "--no-estimate", "--quiet"))
+    before = volume("bent.brep")
     for name in ("big.step", "big.iges"):
         expect_ok(run("flexel-map", "big.vtu", "-o", name, "--quiet"))
-        expect(abs(volume(name) / volume("bent.brep") / 1000 - 1) < 5e-3, f"{name}: {volume(name)}")
+        found = volume(name)
+        expect(abs(found / before / 1000 - 1) < 5e-3, f"{name}: {found}")
     expect_ok(run("flexel-map", "big.vtu", "-o", "big.brep", "--quiet"))
-    expect(abs(volume("big.brep") / volume("bent.brep") - 1) < 5e-3, "BREP keeps its numbers")
+    expect(abs(volume("big.brep") / before - 1) < 5e-3, "BREP keeps its numbers")
     expect_error(run("flexel-map", "big.vtu", "-o", "x.brep", "--unit", "inch"), "flexel-map", "--unit")
 
 
@@ -370,11 +373,12 @@ def test_assemblies_keep_their_parts_and_colours():
     expect_ok(run("flexel-simulate", "scene.toml", "rest.vtu", "-o", "bent.vtu", "--no-estimate", "--quiet"))
     said = expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.step")).err
     expect("18 solids of 160 faces" in said and "valid, also" in said, said)
-    names = lambda step: re.findall(r'^part "(.*)"', expect_ok(run("flexel", "info", step)).out.decode(), re.M)
-    expect(names("bent.step") == names(part) and len(names(part)) == 18, f"parts: {names('bent.step')}")
-    tree = lambda step: expect_ok(run("flexel", "info", step)).out.decode().split("parts in their assemblies\n")[1].split("\npart ")[0]
-    expect("  as1/\n    rod-assembly/\n      nut\n      nut-2\n      rod\n    l-bracket-assembly/\n      nut-bolt-assembly/" in tree(part), tree(part))
-    expect(tree("bent.step") == tree(part), f"the tree: {tree('bent.step')}")
+    told = [expect_ok(run("flexel", "info", step)).out.decode() for step in (part, "bent.step")]
+    at_rest, names = (re.findall(r'^part "(.*)"', text, re.M) for text in told)
+    expect(names == at_rest and len(at_rest) == 18, f"parts: {names}")
+    tree_at_rest, tree = (text.split("parts in their assemblies\n")[1].split("\npart ")[0] for text in told)
+    expect("  as1/\n    rod-assembly/\n      nut\n      nut-2\n      rod\n    l-bracket-assembly/\n      nut-bolt-assembly/" in tree_at_rest, tree_at_rest)
+    expect(tree == tree_at_rest, f"the tree: {tree}")
     before, after = part.read_text(errors="replace"), pathlib.Path("bent.step").read_text(errors="replace")
     colours = lambda step: {tuple(round(float(each), 4) for each in rgb) for rgb in re.findall(r"COLOUR_RGB\('[^']*', *([\d.E+-]+), *([\d.E+-]+), *([\d.E+-]+)\)", step.replace("\n", ""))}
     expect(colours(before) <= colours(after), f"colours {colours(before)} {colours(after)}")

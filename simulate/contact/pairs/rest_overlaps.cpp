@@ -21,6 +21,7 @@ std::vector<std::uint8_t> curved_faces(const ContactSurface& surface) {
   constexpr double kMeets = 0.5;  // cosine of 60 degrees
   const std::vector<ContactPoint>& points = surface.points();
   std::vector<Vec3> at;
+  at.reserve(points.size());
   for (const ContactPoint& point : points) at.push_back(point.rest);
   const Neighbours turned =
       neighbours_within(at, kBendReach * surface.widest(), [&](std::uint32_t i, std::uint32_t j) {
