@@ -104,6 +104,33 @@ double area_of(const Surface& surface, const std::vector<std::uint32_t>& region)
   return area;
 }
 
+constexpr double kAsHard = 0.5;  // of the traction: what is pushed so beside a region gives way with it
+
+// What the loads of one region push on it.
+struct PressedRegion {
+  std::string load;  // the first
+  std::vector<std::uint32_t> polygons;
+  double area = 0;             // m^2
+  Vec3 forces = Vec3::Zero();  // N
+  double pressure = 0;         // Pa
+  [[nodiscard]] double force() const { return forces.norm() + std::abs(pressure) * area; }
+};
+
+std::vector<PressedRegion> pressed_regions(const Body& body, const Scene& scene) {
+  std::vector<PressedRegion> pressed;
+  for (const Load& load : scene.get<Loads>().loads) {
+    const std::vector<std::uint32_t> polygons = resolve(load.where, body).polygons;
+    if (polygons.empty()) continue;
+    auto found = std::find_if(pressed.begin(), pressed.end(),
+                              [&](const PressedRegion& each) { return each.polygons == polygons; });
+    if (found == pressed.end())
+      found = pressed.insert(found, {load.name, polygons, area_of(body.surface, polygons)});
+    found->forces += load.force.value_or(Vec3::Zero());
+    found->pressure += load.pressure.value_or(0);
+  }
+  return pressed;
+}
+
 }  // namespace
 
 std::string support_under_two_cells(const Body& body, const Scene& scene) {
@@ -118,26 +145,23 @@ std::string support_under_two_cells(const Body& body, const Scene& scene) {
 }
 
 std::vector<UnresolvedIndentation> indentations_under_two_cells(const Body& body, const Scene& scene) {
-  const std::vector<Load>& loads = scene.get<Loads>().loads;
-  const std::vector<std::vector<std::uint32_t>> regions = regions_of(loads, body);
-  std::vector<std::vector<std::uint32_t>> all = regions_of(scene.get<Supports>().ties, body);
-  all.insert(all.end(), regions.begin(), regions.end());
-  const std::vector<std::uint32_t> taken = joined(all);
+  const std::vector<PressedRegion> pressed = pressed_regions(body, scene);
+  const std::vector<std::vector<std::uint32_t>> held = regions_of(scene.get<Supports>().ties, body);
   const std::vector<Material> materials = known_materials(scene, body);
   std::vector<UnresolvedIndentation> found;
-  for (std::size_t l = 0; l < loads.size(); ++l) {
-    const auto width = width_under_two_cells(body, regions[l], taken);
+  for (const PressedRegion& each : pressed) {
+    std::vector<std::vector<std::uint32_t>> taken = held;
+    for (const PressedRegion& other : pressed)
+      if (other.force() * each.area >= kAsHard * each.force() * other.area) taken.push_back(other.polygons);
+    const auto width = width_under_two_cells(body, each.polygons, joined(taken));
     if (!width) continue;
-    const double area = area_of(body.surface, regions[l]);
-    const double force =
-        loads[l].force ? loads[l].force->norm() : std::abs(loads[l].pressure.value_or(0)) * area;
-    const std::size_t part = body.surface.polygon_part(regions[l].front());
+    const std::size_t part = body.surface.polygon_part(each.polygons.front());
     const Material& material = materials[part];
-    if (!(force > 0) || !(material.young > 0)) continue;
+    if (!(each.force() > 0) || !(material.young > 0)) continue;
     const double spacing = body.parts[part].lattice.spacing.mean();
-    const double under_load =
-        1.122 * (1 - material.poisson * material.poisson) * force / (material.young * std::sqrt(area));
-    found.push_back({loads[l].name, regions[l], *width, under_load * spacing / (*width + spacing)});
+    const double under_load = 1.122 * (1 - material.poisson * material.poisson) * each.force() /
+                              (material.young * std::sqrt(each.area));
+    found.push_back({each.load, each.polygons, *width, under_load * spacing / (*width + spacing)});
   }
   return found;
 }

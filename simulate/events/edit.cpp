@@ -83,11 +83,14 @@ class EditedAlready {
   std::string column_;
 };
 
-bool holds_any(const Chosen& chosen) {
-  const auto any = [](const std::vector<std::uint8_t>& of) {
-    return std::find(of.begin(), of.end(), 1) != of.end();
-  };
-  return any(chosen.cells) || any(chosen.elements);
+// A cell, or an element at the centre of a voxel; where elements at corners have what is edited, any of them.
+bool holds_any(const Body& body, const Chosen& chosen, bool at_corners) {
+  if (std::find(chosen.cells.begin(), chosen.cells.end(), 1) != chosen.cells.end()) return true;
+  return std::any_of(body.parts.begin(), body.parts.end(), [&](const Part& part) {
+    const auto end = chosen.elements.begin() + part.element_end;
+    return (at_corners || part.placement == Placement::centre) &&
+           std::find(chosen.elements.begin() + part.element_begin, end, 1) != end;
+  });
 }
 
 constexpr std::size_t kConnectionsOfElement = half_neighbourhood.size();
@@ -185,8 +188,15 @@ std::string Edit::apply(EventContext& context) const {
   EditedAlready edited(context, origin_);  // a tool may pass twice
   Chosen chosen = choose(region_, context.body, context.state);
   if (of_ != Of::elements) return edit_connections(context, chosen);
+  const bool at_corners = friction_ != 1 || stick_ != 0 || radius_ != 1;
+  if (!holds_any(context.body, chosen, at_corners))
+    throw EmptySelectionError(
+        origin_,
+        fmt::format("edit: no cell has more than half of its elements in {}: take a larger region, or "
+                    "smaller cells",
+                    describe(region_)));
   edited.leave_out(chosen);
-  if (!holds_any(chosen))
+  if (!holds_any(context.body, chosen, at_corners))
     throw EmptySelectionError(origin_, fmt::format("all of {} was edited already", describe(region_)));
   std::vector<std::uint8_t> elements = chosen.elements;
   for (const Part& part : context.body.parts)

@@ -53,6 +53,21 @@ std::vector<std::uint32_t> in_shapes(const Selection& shapes, const Body& body, 
   return all;
 }
 
+// Where matter is now. One of a list or of "not" that holds nothing is a mistake, though the event may have found something
+// else.
+Selected present_selection(const Selection& where, const Body& body, const std::vector<Vec3>* at) {
+  try {
+    return resolve(where, body, at);
+  } catch (const EmptySelectionError& error) {
+    if (where.kind != Selection::Kind::any_of && where.kind != Selection::Kind::complement) throw;
+    throw InputError(
+        error.where(),
+        fmt::format("{}; of a list, or under \"not\", each needs to hold something: an [[event]] "
+                    "with \"every\" for each alone may find nothing",
+                    error.what()));
+  }
+}
+
 // The elements in shapes that move with a part, without its own.
 Selected carried_selection(const EventRegion& region, const Body& body, const State& state,
                            std::vector<Vec3> at) {
@@ -114,7 +129,7 @@ Chosen choose(const EventRegion& region, const Body& body, const State& state) {
   std::vector<Vec3> now(body.element_count());
   for (std::size_t e = 0; e < now.size(); ++e) now[e] = body.rest[e] + state.displacement[e];
   const Selected selected = region.with.empty()
-                                ? resolve(*region.where, body, region.at_rest ? nullptr : &now)
+                                ? present_selection(*region.where, body, region.at_rest ? nullptr : &now)
                                 : carried_selection(region, body, state, std::move(now));
   for (const std::uint32_t e : selected.elements) chosen.elements[e] = 1;
   for (std::size_t c = 0; c < chosen.cells.size(); ++c) {

@@ -18,8 +18,9 @@ std::string RepeatedEvents::happen(const Event& event, EventContext& context) {
   if (event.turn + 1 < event.turns) return "";
   if (turns.found > 0)
     return fmt::format("{} of {} times, at last {}", turns.found, turns.happened, turns.last);
-  context.progress.warn(fmt::format("{}: {} found nothing in {} times: {}", event.origin, event.name,
-                                    turns.happened, turns.nothing));
+  context.progress.warn(
+      fmt::format("{}: {} found nothing in {} times{}: {}", event.origin, event.name, turns.happened,
+                  turns.happened < event.turns ? " since the run was resumed" : "", turns.nothing));
   return "";
 }
 

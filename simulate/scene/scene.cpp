@@ -222,6 +222,10 @@ void parse_events(TableReader& root, Scene& scene) {
     if (scene.run.time && !(event.at >= 0 && event.at <= *scene.run.time))
       reader.fail(
           fmt::format("\"at\" = {:.6g} s is not within the run, 0 s to {:.6g} s", event.at, *scene.run.time));
+    if (event.every > 0 && std::any_of(scene.events.begin(), scene.events.end(), [&](const Event& other) {
+          return other.turns > 1 && other.origin == event.origin;  // by which they are told apart
+        }))
+      reader.fail("two events with \"every\" begin on one line: give each a line of its own");
     if (event.every > 0)
       add_turns(event, *scene.run.time, reader, scene.events);
     else

@@ -36,6 +36,7 @@ namespace {
 constexpr int kCheck = 100;          // steps between checks; implicit ones are checked one by one
 constexpr std::size_t kRows = 1000;  // of the history, unless the scene says otherwise
 constexpr std::size_t kFrames = 50;  // likewise
+constexpr double kSameTime = 1e-12;  // share of a time
 
 class TimedRun {
  public:
@@ -137,7 +138,8 @@ void TimedRun::begin() {
   if (!stuck.empty()) start_.transferred_states = {{Contact::name, transfer_of(stuck)}};
   segment_.emplace(body_, scene_, options_, progress_, start_, state_of(body_));
   start_.transferred_states.clear();
-  if (!stuck.empty() && !scene_.get<Contact>().sticks()) {
+  const bool sticks = scene_.get<Contact>().sticks() || body_.element_columns.contains("stick_change");
+  if (!stuck.empty() && !sticks) {
     progress_.warn(
         fmt::format("{}: {} places of surfaces stuck together at the end of an earlier run; nothing of this "
                     "scene has stick, "
@@ -304,7 +306,7 @@ void TimedRun::enter_half_step() {
 
 // From the beginning of an act to its end, or from where a checkpoint has it to there.
 void TimedRun::play_until(double end, bool resumed) {
-  const auto goes_on = [&] { return *segment_->state().time < end * (1 - 1e-12) && !over(); };
+  const auto goes_on = [&] { return *segment_->state().time < end * (1 - kSameTime) && !over(); };
   const bool first = clock_.steps == 0 && goes_on() && !resumed;
   clock_.until = end;
   if (goes_on() && !resumed) segment_->choose_step(clock_);
@@ -345,8 +347,8 @@ void TimedRun::apply(std::size_t end) {
     ledger.changed = !ledger.rows.empty();
     history_.reset();
   }
-  at_whole_step_ = clock_.steps > 0 && segment_->kicks();
-  if (at_whole_step_) segment_->kick(0.5 * clock_.previous);
+  const bool was_whole = std::exchange(at_whole_step_, clock_.steps > 0 && segment_->kicks());
+  if (at_whole_step_ && !was_whole) segment_->kick(0.5 * clock_.previous);
   segment_->store(segment_->state());
   segment_->add_effort(result_, options_.explain);
   start_.transferred_states = segment_->transferred_states();
@@ -385,7 +387,8 @@ void TimedRun::play() {
   while (events_ < scene_.events.size() && !over()) {
     const double at = scene_.events[events_].at;
     std::size_t end = events_ + 1;
-    while (end < scene_.events.size() && scene_.events[end].at == at) ++end;
+    // times that rounding alone tells apart, as 3 x 0.1 s and 0.3 s, are one: no step lies between them
+    while (end < scene_.events.size() && at >= scene_.events[end].at * (1 - kSameTime)) ++end;
     play_until(at, std::exchange(resumed, false));
     if (over()) break;
     apply(end);

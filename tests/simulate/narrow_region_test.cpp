@@ -126,6 +126,18 @@ TEST(NarrowLoad, SinksInAsIntoAHalfSpaceAsFarAsItsCellsSpreadIt) {
   couple.force.reset();
   couple.torque = Vec3(0, 0, 1);
   EXPECT_TRUE(found(0.5, couple).empty());
+  // Several loads on it act together; what is pushed beside it by less goes on.
+  Scene two;
+  two.material = "steel";
+  Load beside = load;
+  beside.where = select_by_name("plate/1");
+  beside.force = Vec3(0, 0, -8e6);  // on 8 m^2
+  two.get<Loads>().loads = {load, load, beside};
+  const auto together = indentations_under_two_cells(plate(0.5), two);
+  ASSERT_EQ(together.size(), 1);
+  EXPECT_NEAR(together[0].depth, 2 * on_half_space / 2, 1e-12 * on_half_space);
+  *two.get<Loads>().loads[2].force *= 6;
+  EXPECT_TRUE(indentations_under_two_cells(plate(0.5), two).empty());
   load.where.kind = Selection::Kind::any_of;
   load.where.members = {select_by_name("plate/1"), select_by_name("plate/2")};
   EXPECT_TRUE(found(0.5, load).empty()) << "nothing goes on beside it";

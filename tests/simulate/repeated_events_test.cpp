@@ -6,6 +6,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "formats/lattice/fused_points.h"
 #include "formats/lattice/merge.h"
 #include "simulate/simulate.h"
 #include "tests/simulate/box_body.h"
@@ -132,20 +133,83 @@ TEST(RepeatedEvents, WhatNeverMeetsAnythingIsToldOnce) {
   EXPECT_EQ(cells_of(body, 0).size(), 96u);
 }
 
-TEST(RepeatedEvents, ACarvingThatTakesNothingIsRefusedOrPassedOver) {
+TEST(RepeatedEvents, WhatChangesNoCellIsRefusedOrPassedOver) {
   // It holds one element, and so less than half of any cell.
-  const std::string small =
-      "do = \"carve\"\nwhere = { sphere = { centre = [\"20 mm\", \"20 mm\", \"20 mm\"], radius = \"3 mm\" } "
+  const std::string where =
+      "where = { sphere = { centre = [\"20 mm\", \"20 mm\", \"20 mm\"], radius = \"3 mm\" } "
       "}\n";
-  try {
-    (void)run_scene(scene_with("[[event]]\nat = \"1 ms\"\n" + small));
-    FAIL() << "accepted";
-  } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("no cell has more than half of its elements in sphere"));
+  for (const std::string what : {"do = \"carve\"\n", "do = \"edit\"\nstiffness = 3\ndensity = 2\n"}) {
+    const std::string small = what + where;
+    try {
+      (void)run_scene(scene_with("[[event]]\nat = \"1 ms\"\n" + small));
+      ADD_FAILURE() << "accepted: " << what;
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("no cell has more than half of its elements in sphere"));
+    }
+    const testing::TimedCase made =
+        run_scene(scene_with("[[event]]\nat = \"1 ms\"\nevery = \"2 ms\"\n" + small));
+    EXPECT_EQ(cells_of(made.body, 0).size(), 96u);
   }
-  const testing::TimedCase made =
-      run_scene(scene_with("[[event]]\nat = \"1 ms\"\nevery = \"2 ms\"\n" + small));
-  EXPECT_EQ(cells_of(made.body, 0).size(), 96u);
+  // Friction is of elements.
+  (void)run_scene(scene_with("[[event]]\nat = \"1 ms\"\ndo = \"edit\"\nfriction = 2\n" + where));
+}
+
+TEST(RepeatedEvents, TimesThatRoundingTellsApartAreOne) {
+  // 0.1 s, three times, is not 0.3 s: velocities were led to the time of the second event twice.
+  const auto falling = [](const std::string& second) {
+    const std::string fall =
+        "material = \"gum\"\n[materials.gum]\nyoung = \"1 MPa\"\npoisson = 0.3\ndensity = \"1000 "
+        "kg/m3\"\n[gravity]\nacceleration = [0, 0, \"-9.81 m/s2\"]\n[run]\nmethod = \"verlet\"\ntime = \"40 "
+        "ms\"\n";
+    const auto edit_at = [](const std::string& at) {
+      return "[[event]]\ndo = \"edit\"\nfriction = 2\nat = \"" + at + "\"\n";
+    };
+    const testing::TimedCase made =
+        testing::run_timed(block_of("work", {2, 2, 2}, Vec3::Zero()),
+                           parse_scene(fall + edit_at("0.03 s") + edit_at(second), "scene.toml"));
+    testing::expect_books_close(made.result);
+    return made.history.column("momentum z").back();
+  };
+  const double at_once = falling("0.03 s");
+  EXPECT_NEAR(at_once, -9.81 * 0.04 * 8e-3, 1e-12);
+  EXPECT_NEAR(falling("0.030000000000000006 s"), at_once, 1e-12);
+  EXPECT_NEAR(falling("0.03000000000001 s"), at_once, 1e-12) << "no step lies between these either";
+}
+
+TEST(RepeatedEvents, AWelderFusesOnce) {
+  // Blocks whose elements meet: the nearest of the cells that share one is another at each time.
+  Body body = block_of("lower", {3, 3, 2}, Vec3::Zero());
+  append(body, block_of("upper", {3, 3, 2}, Vec3(0, 0, 0.02)));
+  const auto fused = [&](const std::string& every) {
+    const Body made =
+        testing::run_timed(
+            body,
+            parse_scene(
+                "material = \"gum\"\n[materials.gum]\nyoung = \"1 MPa\"\npoisson = 0.3\ndensity = "
+                "\"1000 kg/m3\"\n[run]\ntime = \"6 ms\"\n[[fix]]\nwhere = \"lower/z0\"\n[[load]]\nwhere = "
+                "\"upper/z1\"\nforce = [\"2 N\", \"1 N\", \"1 N\"]\n[[event]]\nat = \"0 s\"\ndo = "
+                "\"fuse\"\nwithin = \"4 mm\"\n" +
+                    every,
+                "scene.toml"))
+            .body;
+    return fused_points(made).size();
+  };
+  const std::size_t once = fused("");
+  EXPECT_GT(once, 16u);
+  EXPECT_EQ(fused("every = \"1 ms\"\n"), once);
+}
+
+TEST(RepeatedEvents, OneOfAListThatHoldsNothingIsNotPassedOver) {
+  const std::string box =
+      "{ box = { min = [\"-1 mm\", \"-1 mm\", \"-1 mm\"], max = [\"25 mm\", \"25 mm\", \"25 mm\"] } }";
+  const std::string none = "{ sphere = { centre = [\"1 m\", 0, 0], radius = \"9 mm\" } }";
+  for (const std::string& where : {"[" + box + ", " + none + "]", "{ not = " + none + " }"}) try {
+      (void)run_scene(
+          scene_with("[[event]]\nat = \"1 ms\"\nevery = \"1 ms\"\ndo = \"carve\"\nwhere = " + where + "\n"));
+      ADD_FAILURE() << "accepted: " << where;
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("each needs to hold something"));
+    }
 }
 
 TEST(RepeatedEvents, WrongEntriesAreRefused) {
@@ -175,6 +239,13 @@ TEST(RepeatedEvents, WrongEntriesAreRefused) {
   std::string other = carve;
   other.replace(other.find("with = \"mill\""), 13, "with = \"milk\"");
   EXPECT_THAT(message(other), HasSubstr("no part is called that; did you mean \"mill\"?"));
+  EXPECT_THROW(
+      (void)parse_scene(
+          "event = [{ at = \"1 ms\", every = \"1 ms\", do = \"carve\", where = \"work\" }, { at = \"2 ms\", "
+          "every = \"1 ms\", do = \"carve\", where = \"mill\" }]\n[run]\ntime = \"9 ms\"\n",
+          "scene.toml"),
+      InputError)
+      << "they would be told apart by their line";
   EXPECT_THROW(
       (void)parse_scene("[[event]]\ndo = \"carve\"\nevery = \"1 ms\"\nwhere = \"work\"\n", "scene.toml"),
       InputError);

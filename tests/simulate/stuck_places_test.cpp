@@ -123,6 +123,14 @@ TEST(StuckPlaces, ALaterSceneThatDoesNotStickLetsGo) {
               HasSubstr("nothing of this scene has stick, and they come off"));
   EXPECT_GT(after.position[0].z() - half.position[0].z(), 0.5 * kSide);
   EXPECT_TRUE(stuck_places(after).empty());
+  // What an earlier run's glue (an event's edit) holds needs nothing of the scene.
+  Body glued = half;
+  glued.element_columns["stick_change"] = {1, std::vector<double>(half.element_count(), 2000)};
+  ::testing::internal::CaptureStderr();
+  Progress lines("test", Progress::Mode::lines);
+  (void)simulate(glued, scene, {}, lines);
+  EXPECT_THAT(::testing::internal::GetCapturedStderr(), ::testing::Not(HasSubstr("come off")));
+  EXPECT_FALSE(stuck_places(glued).empty());
 }
 
 }  // namespace
