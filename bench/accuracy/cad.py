@@ -166,7 +166,7 @@ def page(rows, groups):
     lines = ["# STEP in, the same STEP out", "", "Written by `bench/accuracy/cad.py`: do not edit.", "",
              " ".join(__doc__.split("\n\n", 2)[2].split()), "",
              f"{len(done)} of {len(rows)} parts were bent. OpenCASCADE's check finds {valid} valid, written and read again; gmsh meshes {meshed} of them, and {meshable} "
-             f"of the parts as they were. The volumes of gmsh's meshes and of the mapped triangles changed by the same to {100 * apart[len(apart) // 2]:.3f} % (median; "
+             f"of the parts as they were, at the same sizes. The volumes of gmsh's meshes and of the mapped triangles changed by the same to {100 * apart[len(apart) // 2]:.3f} % (median; "
              f"largest {100 * apart[-1]:.2f} %). Median {seconds[len(seconds) // 2]:.1f} s, longest {seconds[-1]:.1f} s.", ""]
     for title, group in groups:
         lines += [f"## {title}", "", "| part | solids | faces (kept as they were) | farthest from the deformation | tolerance | valid | gmsh meshes it | "

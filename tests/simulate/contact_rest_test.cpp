@@ -238,6 +238,46 @@ TEST(Contact, APressFitPressesByItsInterference) {
     }
 }
 
+// The tip of a screw presses a pin as one that comes from apart, beside a plate whose hole the pin fills: that fit is not its.
+TEST(Contact, WhatOverlapsAPinBesideItsHolePresses) {
+  constexpr double kRelease = 0.01, kRadius = 2.7 * kSide;  // s, m
+  // N, on the screw, which begins `depth` [m] in the pin and moves on by `way` [m].
+  const auto pressed = [](double width, double depth, double way, double release) {
+    Body body = prism(block("plate", {12, 12, 4}, Vec3(-6 * kSide, -6 * kSide, -0.5 * kSide)), 40, 5 * kSide,
+                      kRadius, 0, 3 * kSide);
+    append(body, prism(block("pin", {8, 8, 8}, Vec3(-4 * kSide, -4 * kSide, -2.5 * kSide)), 40, kRadius, 0,
+                       -1.2 * kSide, 4.1 * kSide));
+    const double tip = kRadius - depth, low = 3.05 * kSide;
+    std::vector<Vec3> vertices;
+    for (const double z : {low, low + width})
+      for (const auto& [x, y] : {std::pair{0.0, -0.5}, {3.0, -0.5}, {3.0, 0.5}, {0.0, 0.5}})
+        vertices.emplace_back(tip + x * kSide, y * width, z);
+    append(body, within_block(
+                     block("screw", {5, 4, 4}, Vec3(tip - 0.5 * kSide, -2 * kSide, 2.5 * kSide)), vertices,
+                     {{3, 2, 1, 0}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}}));
+    const Problem problem = problem_of(body);
+    ContactSettings settings = all_parts(body);
+    settings.release_time = release;
+    Contacts contacts(settings, problem);
+    State state = starting_at_rest(body);
+    std::vector<Vec3> forces(body.element_count(), Vec3::Zero());
+    contacts.add_forces(state, forces);
+    state.time = release;
+    const Part& screw = body.parts[2];
+    for (std::uint32_t e = screw.element_begin; e < screw.element_end; ++e)
+      state.displacement[e] = Vec3(-way, 0, 0);
+    std::fill(forces.begin(), forces.end(), Vec3::Zero());
+    contacts.add_forces(state, forces);
+    double sum = 0;
+    for (std::uint32_t e = screw.element_begin; e < screw.element_end; ++e) sum += forces[e].x();
+    return sum;
+  };
+  for (const double width : {0.6 * kSide, kSide})
+    for (const double depth : {0.1 * kSide, 0.6 * kSide})
+      EXPECT_NEAR(pressed(width, depth, 0, kRelease) / pressed(width, 0, depth, 0), 1, 0.1)
+          << width << " " << depth;
+}
+
 // Its edge and its faces press, as those of one that comes from apart, but for pairs that come near when they are deep.
 TEST(Contact, ATiltedBoxThatBeginsInAFlatFacePresses) {
   struct Begins {

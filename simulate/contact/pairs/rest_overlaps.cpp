@@ -36,6 +36,9 @@ std::vector<std::uint8_t> curved_faces(const ContactSurface& surface) {
   return curved;
 }
 
+// What a point has before it at rest.
+enum Paired : std::uint8_t { kAlone, kPaired, kPairedWithSeveral };
+
 // Of two parts, both faces, near each other at rest.
 struct FacingPair {
   std::uint32_t i = 0, j = 0;
@@ -58,6 +61,29 @@ std::vector<double> sums_around(const std::vector<FacingPair>& pairs, const Neig
       sums[b] += own[a];
     }
   return sums;
+}
+
+// Marks the points around which pairs are with several parts: how one of these fits says nothing of the others, but their own
+// points know.
+void mark_several(const std::vector<FacingPair>& pairs, const Neighbours& around,
+                  const std::vector<ContactPoint>& points, std::vector<std::uint8_t>& is_paired) {
+  constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max(), kSeveral = kNone - 1;
+  const auto add = [](std::uint32_t& others, std::uint32_t other) {
+    if (other != kNone) others = others == kNone || others == other ? other : kSeveral;
+  };
+  std::vector<std::uint32_t> own(points.size(), kNone);
+  for (const FacingPair& pair : pairs) {
+    add(own[pair.i], points[pair.j].part);
+    add(own[pair.j], points[pair.i].part);
+  }
+  std::vector<std::uint32_t> others = own;
+  for (std::uint32_t a = 0; a < points.size(); ++a)
+    for (const std::uint32_t b : around.of(a)) {
+      add(others[a], own[b]);
+      add(others[b], own[a]);
+    }
+  for (std::uint32_t i = 0; i < points.size(); ++i)
+    if (others[i] == kSeveral) is_paired[i] = kPairedWithSeveral;
 }
 
 }  // namespace
@@ -108,12 +134,13 @@ void RestOverlaps::find_fits(const ContactMaterials& materials, const ExcludedPa
         pairs.push_back({i, j, rest.weight, -rest.gap, most(i, j, rest, constants)});
     }
   if (pairs.empty()) return;
-  std::vector<std::uint8_t> is_paired(points.size(), 0);
-  for (const FacingPair& pair : pairs) is_paired[pair.i] = is_paired[pair.j] = 1;
+  std::vector<std::uint8_t> is_paired(points.size(), kAlone);
+  for (const FacingPair& pair : pairs) is_paired[pair.i] = is_paired[pair.j] = kPaired;
   const Neighbours around =
       neighbours_within(at, kBendReach * surface_.widest(), [&](std::uint32_t i, std::uint32_t j) {
-        return points[i].part == points[j].part && is_paired[i] && is_paired[j];
+        return points[i].part == points[j].part && is_paired[i] != kAlone && is_paired[j] != kAlone;
       });
+  mark_several(pairs, around, points, is_paired);
   const auto sums = [&](const auto& value) { return sums_around(pairs, around, points.size(), value); };
   using Pair = const FacingPair&;
   const std::vector<double> weight = sums([](Pair pair, std::uint32_t) { return pair.weight; }),
@@ -126,7 +153,7 @@ void RestOverlaps::find_fits(const ContactMaterials& materials, const ExcludedPa
     return std::abs(pair.depth - mean) <= pair.most ? pair.weight : 0;
   });
   for (std::uint32_t i = 0; i < points.size(); ++i) {
-    if (!(weight[i] > 0) || !(fits[i] >= kFitting * weight[i])) continue;
+    if (is_paired[i] != kPaired || !(weight[i] > 0) || !(fits[i] >= kFitting * weight[i])) continue;
     const double mean = depth[i] / weight[i];
     const double scatter = std::sqrt(std::max(square[i] / weight[i] - mean * mean, 0.0));
     interference_[i] = mean > kScatter * scatter ? mean : 0;
@@ -140,19 +167,21 @@ void RestOverlaps::spread_to_rims(const std::vector<Vec3>& at, const std::vector
   const std::vector<ContactPoint>& points = surface_.points();
   const Neighbours beside =
       neighbours_within(at, kBendReach * surface_.widest(), [&](std::uint32_t i, std::uint32_t j) {
-        return points[i].part == points[j].part && is_paired[i] != is_paired[j] &&
-               points[i].normal.dot(points[j].normal) > kLooksAt &&
-               !std::isnan(interference_[is_paired[i] ? i : j]);
+        return points[i].part == points[j].part && (is_paired[i] == kAlone) != (is_paired[j] == kAlone) &&
+               points[i].normal.dot(points[j].normal) > kLooksAt;
       });
   std::vector<double> sum(points.size(), 0), count(points.size(), 0);
+  std::vector<std::uint8_t> of_several(points.size(), 0);
   for (std::uint32_t i = 0; i < points.size(); ++i)
     for (const std::uint32_t j : beside.of(i)) {
-      const std::uint32_t fit = is_paired[i] ? i : j, rim = is_paired[i] ? j : i;
+      const std::uint32_t fit = is_paired[i] != kAlone ? i : j, rim = is_paired[i] != kAlone ? j : i;
+      if (is_paired[fit] == kPairedWithSeveral) of_several[rim] = 1;
+      if (std::isnan(interference_[fit])) continue;
       sum[rim] += interference_[fit];
       count[rim] += 1;
     }
   for (std::uint32_t i = 0; i < points.size(); ++i)
-    if (count[i] > 0) interference_[i] = sum[i] / count[i];
+    if (count[i] > 0 && of_several[i] == 0) interference_[i] = sum[i] / count[i];
 }
 
 // What overlaps a flat face presses, at any angle, and so does what faces the other squarely.
