@@ -107,7 +107,7 @@ def test_study():
     flexel = module()
     part = flexel.Part.from_mesh(*box())
     part.write("box.ply")
-    found = flexel.study("box.ply", output="study", unit="m", budget="4 s", **PULL)
+    found = flexel.study("box.ply", output="study", unit="m", budget="8 s", **PULL)
     check.assertTrue(found["runs"] if "runs" in found else found)
     check.assertEqual(found, json.loads(pathlib.Path("study/study.json").read_text()))
 
