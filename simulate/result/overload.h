@@ -4,8 +4,8 @@
 
 namespace flexel::simulate {
 
-// At its first stiffness a load would move the part by many times its size: its unit or that of the part is wrong. No
-// other lattice or model has a better answer.
+// At its first stiffness a load would move the part by many times its size: most likely its unit or that of the part is
+// wrong. Whoever searches for a size or a model ends with this and tries no other.
 class OverloadError : public DivergedError {
  public:
   using DivergedError::DivergedError;

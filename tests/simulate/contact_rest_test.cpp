@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <map>
 
 #include "simulate/effects/contact.h"
@@ -199,6 +200,25 @@ TEST(Contact, APinThatFillsAHoleFeelsNothingUntilItIsPushed) {
   }
 }
 
+// N, on each element, when what overlaps at rest has been let out in `release` [s] (0: at once) and a part is moved by
+// `displacement` [m] of each of its elements.
+std::vector<Vec3> forces_let_out(const Body& body, double release, std::size_t part,
+                                 const std::function<Vec3(std::uint32_t)>& displacement) {
+  const Problem problem = problem_of(body);
+  ContactSettings settings = all_parts(body);
+  settings.release_time = release;
+  Contacts contacts(settings, problem);
+  State state = starting_at_rest(body);
+  std::vector<Vec3> forces(body.element_count(), Vec3::Zero());
+  contacts.add_forces(state, forces);
+  state.time = release;
+  for (std::uint32_t e = body.parts[part].element_begin; e < body.parts[part].element_end; ++e)
+    state.displacement[e] = displacement(e);
+  std::fill(forces.begin(), forces.end(), Vec3::Zero());
+  contacts.add_forces(state, forces);
+  return forces;
+}
+
 // Facets do not press, the interference does: as a pin that just fits and swells by as much, let out or at once.
 TEST(Contact, APressFitPressesByItsInterference) {
   constexpr double kRelease = 0.01;  // s
@@ -208,19 +228,9 @@ TEST(Contact, APressFitPressesByItsInterference) {
                       radius, 0, 3 * kSide);
     append(body, prism(block("pin", {8, 8, 8}, Vec3(-4 * kSide, -4 * kSide, -2.5 * kSide)), 40,
                        radius + interference, 0, -1.2 * kSide, 4.1 * kSide));
-    const Problem problem = problem_of(body);
-    ContactSettings settings = all_parts(body);
-    settings.release_time = release;
-    Contacts contacts(settings, problem);
-    State state = starting_at_rest(body);
-    std::vector<Vec3> forces(body.element_count(), Vec3::Zero());
-    contacts.add_forces(state, forces);
-    state.time = release;
     const auto across = [&](std::uint32_t e) { return Vec3(body.rest[e].x(), body.rest[e].y(), 0); };
-    for (std::uint32_t e = body.parts[1].element_begin; e < body.parts[1].element_end; ++e)
-      state.displacement[e] = swelling / radius * across(e);
-    std::fill(forces.begin(), forces.end(), Vec3::Zero());
-    contacts.add_forces(state, forces);
+    const std::vector<Vec3> forces = forces_let_out(
+        body, release, 1, [&](std::uint32_t e) -> Vec3 { return swelling / radius * across(e); });
     double sum = 0;
     for (std::uint32_t e = body.parts[1].element_begin; e < body.parts[1].element_end; ++e)
       sum -= forces[e].dot(across(e).normalized());
@@ -255,19 +265,9 @@ TEST(Contact, WhatOverlapsAPinBesideItsHolePresses) {
     append(body, within_block(
                      block("screw", {5, 4, 4}, Vec3(tip - 0.5 * kSide, -2 * kSide, 2.5 * kSide)), vertices,
                      {{3, 2, 1, 0}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}}));
-    const Problem problem = problem_of(body);
-    ContactSettings settings = all_parts(body);
-    settings.release_time = release;
-    Contacts contacts(settings, problem);
-    State state = starting_at_rest(body);
-    std::vector<Vec3> forces(body.element_count(), Vec3::Zero());
-    contacts.add_forces(state, forces);
-    state.time = release;
     const Part& screw = body.parts[2];
-    for (std::uint32_t e = screw.element_begin; e < screw.element_end; ++e)
-      state.displacement[e] = Vec3(-way, 0, 0);
-    std::fill(forces.begin(), forces.end(), Vec3::Zero());
-    contacts.add_forces(state, forces);
+    const std::vector<Vec3> forces =
+        forces_let_out(body, release, 2, [&](std::uint32_t) { return Vec3(-way, 0, 0); });
     double sum = 0;
     for (std::uint32_t e = screw.element_begin; e < screw.element_end; ++e) sum += forces[e].x();
     return sum;
