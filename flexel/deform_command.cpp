@@ -355,7 +355,10 @@ class GoalRuns {
     } catch (const DivergedError& error) {
       if (!model_.take_back(error.what())) throw;
     } catch (const TimeoutError&) {
-      if (!limit || !limit->passed() || !model_.take_back("it takes too long")) throw;
+      if (!limit || !limit->passed() || !model_.may_take_back()) throw;
+      limit.reset();
+      if (std::optional<SolvedRun> run = with_few_cells(goes_on)) return *std::move(run);
+      (void)model_.take_back("it takes too long");
     }
     limit.reset();
     return size ? solve(usual_size_, goes_on) : size_of(made(usual_size_));
@@ -428,6 +431,24 @@ class GoalRuns {
     return judged ? judged->error : std::numeric_limits<double>::infinity();
   }
 
+  // Of model `quadratic`, where the usual count takes too long: a few such cells bend far better than those of model `cells` do
+  // where walls are thin. Nothing where these fail too.
+  std::optional<SolvedRun> with_few_cells(const GoesOn& goes_on) {
+    constexpr double kSecondTrial = 0.3;  // of the time
+    few_ = true;
+    try {
+      const StopAfter limit(patience(kSecondTrial, kSecondTrial), "--within");
+      SolvedRun run = solve(made(std::nullopt).size, goes_on);
+      model_.keep();
+      return run;
+    } catch (const InputError&) {
+    } catch (const DivergedError&) {
+    } catch (const TimeoutError&) {  // a limit of the whole command ends what comes next
+    }
+    few_ = false;
+    return {};
+  }
+
   // s, for the first answer of a model that nobody asked for.
   [[nodiscard]] double patience(double share = 0.3, double usual_share = 0.45) const {
     constexpr double kUsual = 30;  // s, without --within
@@ -438,7 +459,7 @@ class GoalRuns {
   // No more than --max-elements and --max-memory let pass.
   [[nodiscard]] std::size_t usual_count() const {
     constexpr double kElementsPerCell = 2.5, kSpare = 1.25;  // a preferred size may have a fifth more cells
-    const bool few = plan_.goal->within.value_or(kShort) < kShort, quadratic = model_.quadratic();
+    const bool few = few_ || plan_.goal->within.value_or(kShort) < kShort, quadratic = model_.quadratic();
     const std::size_t count = quadratic ? few ? kFewQuadraticCells : kFirstQuadraticCells
                               : few     ? kFewCells
                                         : kFirstCells;
@@ -518,6 +539,7 @@ class GoalRuns {
   Progress inner_;  // of one run: bars and warnings, no lines
   int tries_ = 0;
   bool solved_ = false;  // one of them
+  bool few_ = false;     // the usual count takes too long
   bool tried_quadratic_ = false;
   HeldWarnings warnings_;
   ModelChoice model_;

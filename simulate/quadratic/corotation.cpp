@@ -51,7 +51,8 @@ Corotation::Corotation(const QuadraticSystem& system, QuadraticOperator& stiffne
       from_rest_(system.nodes().cells.size(), Mat3::Zero()),
       turn_(system.nodes().cells.size()),
       stress_(system.nodes().cells.size()),
-      force_(system.nodes().cells.size() * kCellUnknowns) {
+      force_(system.nodes().cells.size() * kCellUnknowns),
+      local_force_(force_.size()) {
   for (std::uint32_t c = 0; c < system.nodes().cells.size(); ++c)
     if (system.is_supported(c)) supported_.push_back(c);
   for (std::size_t c = 0; c < system.nodes().cells.size(); ++c)
@@ -85,13 +86,16 @@ bool Corotation::evaluate(std::size_t cell, const std::vector<Vec3>& displacemen
   stiffness_.cells().elastic_forces(cell, columns, product);
   CellValues force = product.col(0);
   if (system_.heated()) force -= share * Eigen::Map<const CellValues>(system_.free_forces(cell).data());
+  Eigen::Map<CellValues> kept(&local_force_[cell * kCellUnknowns]);
+  const CellValues stress = foretold_ ? CellValues(kept) : force;
+  kept = force;
   const auto spins = columns.middleCols<3>(1);
   Mat3 turned = spins.transpose() * product.middleCols<3>(1), stressed = Mat3::Zero();
   Vec3 moment = Vec3::Zero();  // Y^T f
   for (std::size_t n = 0; n < kQuadraticNodes; ++n) {
-    const Vec3 f = force.segment<3>(at(n));
+    const Vec3 f = stress.segment<3>(at(n));
     const Mat3 y = spins.middleRows<3>(at(n));
-    moment -= y * f;
+    moment -= y * force.segment<3>(at(n));
     stressed += cross_matrix(f) * y;
     stress_[cell].middleRows<3>(at(n)) = -cross_matrix(f);
   }
@@ -157,6 +161,7 @@ bool Corotation::residual(const std::vector<Vec3>& displacement, double share, s
   parallel_for_each(
       nodes.cells.size(), [&](std::size_t c) { folded[c] = !evaluate(c, displacement, share); },
       kTurnedCellsAtATime);
+  foretold_ = false;
   if (std::any_of(folded.begin(), folded.end(), [](std::uint8_t each) { return each != 0; })) return false;
   std::vector<std::array<Vec3, kQuadraticNodes>> held(supported_.size());
   parallel_for_each(
@@ -182,6 +187,32 @@ bool Corotation::residual(const std::vector<Vec3>& displacement, double share, s
                           std::sqrt(3 * static_cast<double>(nodes.size()) * reach) * stiffest_;
   scale_ = std::max(std::sqrt(outer), rounding / kRounded);
   return true;
+}
+
+void Corotation::foretell(const std::vector<Vec3>& displacement, const std::vector<Vec3>& change,
+                          double more) {
+  const QuadraticNodes& nodes = system_.nodes();
+  parallel_for_each(
+      nodes.cells.size(),
+      [&](std::size_t c) {
+        const auto& of_cell = nodes.of_cell[c];
+        const std::array<Vec3, kQuadraticNodes> local =
+            local_displacement(nodes, c, displacement, from_rest_[c]);
+        CellColumns columns = CellColumns::Zero(), product;
+        for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+          columns.block<3, 1>(at(n), 0) =
+              turn_[c].rotation.transpose() * (change[of_cell[n]] - change[of_cell[0]]);
+        const Vec3 spin = turn_[c].gamma.transpose() * columns.col(0);
+        for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+          columns.block<3, 1>(at(n), 0) +=
+              (nodes.rest[of_cell[n]] - nodes.rest[of_cell[0]] + local[n]).cross(spin);
+        stiffness_.cells().elastic_forces(c, columns, product);
+        Eigen::Map<CellValues> force(&local_force_[c * kCellUnknowns]);
+        force += product.col(0);
+        if (system_.heated()) force -= more * Eigen::Map<const CellValues>(system_.free_forces(c).data());
+      },
+      kTurnedCellsAtATime);
+  foretold_ = true;
 }
 
 void Corotation::stress_forces(const double* x, double* y) const {

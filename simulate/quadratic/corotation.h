@@ -22,6 +22,11 @@ class Corotation {
   // (nodes x 3) N: what is left of loads and forces of cells and supports at `share` of all loads and moves. Finds the
   // rotations; false where a cell is inside out.
   [[nodiscard]] bool residual(const std::vector<Vec3>& displacement, double share, std::vector<Vec3>& left);
+  // Foretells the stresses that the tangent has after the next residual(): those of the last one, and what `change` (nodes x 3, m,
+  // of `displacement`, the last) and `more` of the free strains add to first order. The true ones have what its second
+  // order stretches, which soon outweighs the bending of a thin wall (Magisano, Leonetti and Garcea, Comput. Methods Appl. Mech.
+  // Engrg. 313, 2017: "mixed integration points").
+  void foretell(const std::vector<Vec3>& displacement, const std::vector<Vec3>& change, double more);
   // N, the norm of loads and of what holds the part at the last displacement: what a residual is small beside. Where nothing acts,
   // 1e8 times what rounding leaves of the displacement.
   [[nodiscard]] double scale() const { return scale_; }
@@ -54,6 +59,8 @@ class Corotation {
       turn_;  // (cells) without the part of the stresses, which is stress_, to be added to `a`
   std::vector<CellTurn::Columns> stress_;
   std::vector<double> force_;             // (cells x 81) N, elastic
+  std::vector<double> local_force_;       // (cells x 81) N, of K u^ and free strains, as the cell turned
+  bool foretold_ = false;                 // local_force_ is of the displacement to come
   std::vector<std::uint32_t> supported_;  // cells that supports hold
 };
 

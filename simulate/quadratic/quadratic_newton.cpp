@@ -24,15 +24,18 @@ namespace {
 
 constexpr double kFirstTurn = 1.0;                         // rad, that the first load step aims at
 constexpr double kOutOfProportion = 5;                     // times the size of the part
+constexpr double kMostStrain = 0.02;                       // root mean square, at the first stiffness
 constexpr double kMostTurn = 0.7;                          // rad, of an iteration
 constexpr double kLeastStep = 1. / 256;                    // of the load
 constexpr int kMostIterations = 20;                        // of a load step
 constexpr int kFewIterations = 6;                          // after which the next step is longer
-constexpr double kMostStale = 0.1;                         // rad
+constexpr double kMostStale = 0.02;                        // rad
 constexpr int kMostLinear = 400, kMostLinearInAll = 5000;  // the second: where no load step succeeds
 constexpr int kMoreWithLinks = 7;  // times as many in all: the nodes follow each step of the links
 constexpr double kLeastTolerance = 1e-8, kGoodEnough = 1e-6;
 constexpr double kLoosest = 1e-2;  // residual of a linear solution
+// Of the loads: where cells that turned are stretched, that is a small share of the residual, and bending is in it.
+constexpr double kLoosestOfLoads = 0.1;
 
 // rad: how far moves turn what they lead.
 double largest_angle(const QuadraticSystem& system) {
@@ -78,6 +81,7 @@ class LargeDeflection {
           done > 0 ? further(now, before, ahead) : further(linear, linear, 0, turned ? 0 : share);
       links_.set_motions(done > 0 ? Eigen::VectorXd(links_now + ahead * (links_now - links_before))
                                   : Eigen::VectorXd((turned ? 0 : share) * linear_links));
+      begin_step(now, done, guess, share);
       const int iterations = reach_with_links(share, guess);
       if (iterations > kMostIterations) {
         step = (share - done) / 2;
@@ -183,8 +187,9 @@ class LargeDeflection {
         human_length(reach_), human_number(reach_ / extent_, 2));
   }
 
+  // What is thin may be bent over without much strain.
   void refuse_out_of_proportion(const std::string& scene) const {
-    if (reach_ > kOutOfProportion * extent_)
+    if (reach_ > kOutOfProportion * extent_ && mean_strain(system_, solution_) > kMostStrain)
       throw OverloadError(
           fmt::format("{}: {}; or, if that is meant, write [run] load_steps = 4", scene, overload()));
   }
@@ -227,14 +232,26 @@ class LargeDeflection {
         .value;
   }
 
-  // Equilibrium at a share of the load, from `u`. How many iterations it took; more than kMostIterations: there was none.
-  int reach(double share, std::vector<Vec3>& u) {
-    share_ = share;
+  // Moves the nodes of `u` that are led.
+  void lead(double share, std::vector<Vec3>& u) const {
     const std::vector<Vec3> led = system_.prescribed(share);
     const std::vector<std::uint8_t>& held = tangent_.stiffness.held();
     for (std::size_t n = 0; n < u.size(); ++n)
       for (int axis = 0; axis < 3; ++axis)
         if (held[n] >> axis & 1) u[n][axis] = led[n][axis];
+  }
+
+  // Foretells the stresses of `guess`, at `share`, from the equilibrium `now` at the share `done`.
+  void begin_step(const std::vector<Vec3>& now, double done, std::vector<Vec3>& guess, double share) {
+    lead(share, guess);
+    if (!corotation_.residual(now, done, solution_.unbalanced)) return;  // the next residual tells
+    corotation_.foretell(now, further(guess, now, 1, 0), share - done);
+  }
+
+  // Equilibrium at a share of the load, from `u`. How many iterations it took; more than kMostIterations: there was none.
+  int reach(double share, std::vector<Vec3>& u) {
+    share_ = share;
+    lead(share, u);
     double before = HUGE_VAL;
     for (int iteration = 0; iteration <= kMostIterations; ++iteration) {
       if (!corotation_.residual(u, share, solution_.unbalanced)) return kMostIterations + 1;
@@ -251,7 +268,9 @@ class LargeDeflection {
       if (!solve(u, left, residual, change)) return kMostIterations + 1;
       const double turn = largest_turn(change);
       const double part = turn > kMostTurn ? kMostTurn / turn : 1;
-      parallel_for_each(u.size(), [&](std::size_t n) { u[n] += part * change[n]; });
+      if (part < 1) parallel_for_each(change.size(), [&](std::size_t n) { change[n] *= part; });
+      corotation_.foretell(u, change, 0);
+      parallel_for_each(u.size(), [&](std::size_t n) { u[n] += change[n]; });
       ++solution_.newton_iterations;
     }
     return kMostIterations + 1;
@@ -319,9 +338,10 @@ class LargeDeflection {
     return false;
   }
 
-  // The next residual is of the order of the square of this one, and need be no less than what was asked for.
+  // Share of `residual`, which is beside the loads. The next residual is of the order of the square of this one, and need be
+  // no less than what was asked for.
   [[nodiscard]] double forcing(double residual) const {
-    return std::min(kLoosest, std::max(residual, 0.3 * tolerance_ / residual));
+    return std::min({kLoosest, kLoosestOfLoads / residual, std::max(residual, 0.3 * tolerance_ / residual)});
   }
 
   // The stiffness with what loads add that follow the shape, at `u` and the share of the load that is

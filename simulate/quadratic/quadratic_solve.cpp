@@ -415,4 +415,14 @@ double typical_strain(const QuadraticSystem& system, const QuadraticSolution& so
   return sums.square > 0 ? sums.cube / sums.square : 0;
 }
 
+double mean_strain(const QuadraticSystem& system, const QuadraticSolution& solution) {
+  const QuadraticNodes& nodes = system.nodes();
+  double stiffness = 0;  // N m
+  for (std::size_t c = 0; c < nodes.cells.size(); ++c)
+    stiffness +=
+        system.stiffest(c) * system.problem().body.fill[nodes.cells[c]] * system.lattice(c).spacing.prod();
+  const double energy = energy_of(solution.tangent->stiffness.cells(), nodes, solution);
+  return stiffness > 0 ? std::sqrt(2 * energy / stiffness) : 0;
+}
+
 }  // namespace flexel::simulate

@@ -76,4 +76,7 @@ void report(const QuadraticSystem& system, const QuadraticSolution& solution, Si
 // The strain (largest principal value, without the rotation) where the energy is: its mean, weighted by energy.
 [[nodiscard]] double typical_strain(const QuadraticSystem& system, const QuadraticSolution& solution);
 
+// The root of the mean square of the strain, from the elastic energy: a lower bound, for lambda + 2 mu is taken as stiffness.
+[[nodiscard]] double mean_strain(const QuadraticSystem& system, const QuadraticSolution& solution);
+
 }  // namespace flexel::simulate
