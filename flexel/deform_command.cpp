@@ -336,7 +336,11 @@ class GoalRuns {
         model_(plan.job) {}
 
   SolvedRun operator()(std::optional<double> size, const GoesOn& goes_on) {
+    constexpr double kCoarser = 2.2;
     std::optional<StopAfter> limit;
+    // what takes too long for model `cells` is its usual size, not that of the model that it stands in for
+    if (size && !solved_ && !model_.why_not().empty())
+      size = std::min(*size, preferred_number(kCoarser * usual_size_, 20, Rounded::nearest));
     if (size && model_.may_take_back()) limit.emplace(patience(), "--within");
     try {
       if (size) {
