@@ -166,7 +166,7 @@ void TimedRun::resume(const Checkpoint& from) {
   if (series_) series_->resume(from.frames);
   next_row_ = from.next_row;
   next_frame_ = from.next_frame;
-  frames_ = from.frames.size();
+  frames_ = from.frames.times.size();
 }
 
 // Within an implicit step: what was reached before it stays.
@@ -187,7 +187,7 @@ void TimedRun::keep() {
   kept_->fused = start_.fused;
   kept_->bonding_parts = start_.bonding_parts;
   if (history_) kept_->ledger = history_->ledger();
-  if (series_) kept_->frames = series_->times();
+  if (series_) kept_->frames = series_->place();
   kept_->next_row = next_row_;
   kept_->next_frame = next_frame_;
 }
