@@ -28,7 +28,7 @@
 #include "simulate/estimate/coarsen.h"
 #include "simulate/estimate/error_bars.h"
 #include "simulate/estimate/stress_singularity.h"
-#include "simulate/events/fuse.h"
+#include "simulate/events/fused.h"
 #include "simulate/matter/fragments.h"
 #include "simulate/matter/stress.h"
 #include "simulate/memory.h"
