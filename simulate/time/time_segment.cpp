@@ -14,6 +14,7 @@
 #include "simulate/models/rest_shape.h"
 #include "simulate/paper/connection_friction.h"
 #include "simulate/probes/report.h"
+#include "simulate/scene/coming_parts.h"
 #include "simulate/stepping/failure_messages.h"
 
 namespace flexel::simulate {
@@ -68,7 +69,8 @@ TimeSegment::TimeSegment(Body& body, const Scene& scene, const SimulateOptions& 
       problem_(timed_problem(body, scene, beginning)),
       fused_(beginning.fused),
       probes_(place_probes(scene, problem_)),
-      effects_(active_effects(scene.effects, problem_)),
+      effects_(active_effects(scene.coming_parts.empty() ? scene.effects : without_coming_parts(scene, body),
+                              problem_)),
       state_(std::move(state)) {
   const bool fresh = beginning.fresh;
   if (fresh) report_materials(problem_, progress_);
@@ -207,6 +209,8 @@ void TimeSegment::choose_step(Clock& clock) {
                                    *scene_.run.step, longest));
     step = std::min(clock.steps == 0 ? longest : step, *scene_.run.step);
   }
+  for (const ActiveEffect& effect : effects_)
+    if (!euler_ && !scene_.run.step) step = std::min(step, effect->first_step());
   clock.damping_rate = bound_->damping_rate();
   clock.epoch = *state_.time;
   clock.in_epoch = 0;
