@@ -30,7 +30,7 @@ constexpr double kHeldTwice = 1e-12;  // of the mean of the diagonal, added wher
 constexpr double kSameTwice = 1e-9;   // of the largest eigenvalue
 constexpr double kMostStopped =
     0.05;  // of the kinetic energy, that joints may take from velocities at the start
-constexpr double kJointTurn = 0.015;  // rad a step
+constexpr double kJointTurn = 0.01;  // rad a step
 constexpr double kFirstLength =
     1e-6;  // of the run: of the first steps, from which it is seen what the joints bear
 constexpr double kLeastSteps = 1000;  // of a run

@@ -75,7 +75,7 @@ class JointSystem {
   [[nodiscard]] const Power& after() const { return after_; }
   [[nodiscard]] const std::vector<Place>& places() const { return places_; }
 
-  // 1/s^2, as a bound on the square of a frequency: steps turn no part by more than .015 rad and pass no more than that of
+  // 1/s^2, as a bound on the square of a frequency: steps turn no part by more than .01 rad and pass no more than that of
   // the swing of a pendulum whose joint bears what these do on average.
   [[nodiscard]] double frequency(std::span<const RigidBody* const> bodies);
   // s: of the first steps, from which it is seen what the joints bear; infinity once it is.
