@@ -290,6 +290,22 @@ TEST(Joints, ALedToolCarriesAPendulum) {
   EXPECT_LT((place_now(made.body, 1, at) - at - Vec3(0.016, 0, 0)).norm(), 1e-11);
 }
 
+// A bar that hangs by its end from the world falls on a plane, and lies there at the angle that the plane leaves it.
+TEST(Joints, AJointedPartLiesOnWhatItFallsOn) {
+  Scene scene = mechanism({"bar"}, 0.5);
+  scene.get<Contact>().on = true;
+  scene.get<Contact>().damping = 1e-3;
+  scene.get<Contact>().planes = {testing::plane_at(-0.05)};
+  scene.get<Gravity>().acceleration = Vec3(0, 0, -kGravity);
+  join(scene, joint_of(JointKind::hinge, "bar", "", kEnd, Vec3::UnitY()));
+  const TimedCase made = testing::run_timed(block("bar", {10, 2, 2}), scene);
+  // the lower corner of the end, 100 mm out and 10 mm below the axis at rest, is on the plane, 60 mm below the axis
+  const double reach = std::hypot(0.1, 0.01), angle = std::asin(0.06 / reach) - std::atan2(0.01, 0.1);
+  EXPECT_NEAR(made.history.column("bar angle").back(), angle, 0.01);
+  EXPECT_LT((place_now(made.body, 0, kEnd) - kEnd).norm(), 1e-11);
+  EXPECT_LT(book(made.result, "worst_residual"), 0.01 * book(made.result, "largest_term"));
+}
+
 Scene joined(const std::string& rest,
              const std::string& more = "[parts.bar]\nrigid = true\n[run]\ntime = \"10 ms\"\n",
              const std::string& head = "") {
