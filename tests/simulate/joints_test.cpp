@@ -30,7 +30,7 @@ using testing::kSide;
 using testing::throw_part;
 using testing::TimedCase;
 
-constexpr double kGravity = 9.81;  // m/s2
+constexpr double kFreeFall = 9.81;  // m/s2
 
 // Rigid parts of gum, in `time` s, that do not touch.
 Scene mechanism(const std::vector<std::string>& parts, double time) {
@@ -94,21 +94,21 @@ double energy_swing(const Csv& history) {
   return swing / largest;
 }
 
-constexpr double kLength = 10 * kSide, kThick = 2 * kSide;  // of bars
-const Vec3 kEnd(0, kThick / 2, kThick / 2);
+constexpr double kBarLength = 10 * kSide, kBarThick = 2 * kSide;  // of bars
+const Vec3 kEnd(0, kBarThick / 2, kBarThick / 2);
 
 // m d and J + m d^2 of a bar hung at its end.
 double squared_swing() {
-  const double mass = 1000 * kLength * kThick * kThick, arm = kLength / 2;
-  const double inertia = mass / 12 * (kLength * kLength + kThick * kThick);
-  return mass * kGravity * arm / (inertia + mass * arm * arm);
+  const double mass = 1000 * kBarLength * kBarThick * kBarThick, arm = kBarLength / 2;
+  const double inertia = mass / 12 * (kBarLength * kBarLength + kBarThick * kBarThick);
+  return mass * kFreeFall * arm / (inertia + mass * arm * arm);
 }
 
 TEST(Joints, APendulumSwingsInTheTimeOfTheCompoundPendulum) {
   const double tilt = 0.02, period = 2 * pi / std::sqrt(squared_swing());
   Scene scene = mechanism({"bar"}, 5.3 * period);
   scene.run.history_every = period / 200;
-  scene.get<Gravity>().acceleration = kGravity * Vec3(std::cos(tilt), 0, -std::sin(tilt));
+  scene.get<Gravity>().acceleration = kFreeFall * Vec3(std::cos(tilt), 0, -std::sin(tilt));
   join(scene, joint_of(JointKind::hinge, "bar", "", kEnd, Vec3::UnitY()));
   const TimedCase made = testing::run_timed(block("bar", {10, 2, 2}), scene);
   const std::vector<double> times = crossings(made.history, "bar angle", tilt);
@@ -118,8 +118,8 @@ TEST(Joints, APendulumSwingsInTheTimeOfTheCompoundPendulum) {
   expect_books_close(made.result);
   EXPECT_LT((place_now(made.body, 0, kEnd) - kEnd).norm(), 1e-12);
   // what the hinge bears as the bar hangs: its weight, and what keeps it on its circle
-  EXPECT_NEAR(made.history.column("bar joint force x")[1], -1000 * kLength * kThick * kThick * kGravity,
-              0.01 * 0.4);
+  EXPECT_NEAR(made.history.column("bar joint force x")[1],
+              -1000 * kBarLength * kBarThick * kBarThick * kFreeFall, 0.01 * 0.4);
 }
 
 TEST(Joints, EnergySwingsWithTheSquareOfTheStep) {
@@ -127,7 +127,7 @@ TEST(Joints, EnergySwingsWithTheSquareOfTheStep) {
     Scene scene = mechanism({"one", "two", "three", "four", "five"}, 0.3);
     scene.run.step = step;
     scene.run.history_every = step;
-    scene.get<Gravity>().acceleration = Vec3(0, 0, -kGravity);
+    scene.get<Gravity>().acceleration = Vec3(0, 0, -kFreeFall);
     Body body = block("one", {4, 2, 2});
     const char* names[] = {"one", "two", "three", "four", "five"};
     for (int link = 1; link < 5; ++link)
@@ -187,11 +187,11 @@ TEST(Joints, AFreePairKeepsItsMomenta) {
 
 TEST(Joints, ASliderFallsAlongItsAxis) {
   Scene scene = mechanism({"box"}, 0.2);
-  scene.get<Gravity>().acceleration = Vec3(0, 0, -kGravity);
+  scene.get<Gravity>().acceleration = Vec3(0, 0, -kFreeFall);
   const Vec3 axis = Vec3(1, 2, -2) / 3;
   join(scene, joint_of(JointKind::slider, "box", "", Vec3(0.1, 0.2, 0), axis));
   const TimedCase made = testing::run_timed(block("box", {2, 3, 4}), scene);
-  const double travel = 0.5 * kGravity * 2.0 / 3 * 0.04;
+  const double travel = 0.5 * kFreeFall * 2.0 / 3 * 0.04;
   EXPECT_NEAR(made.history.column("box travel").back(), travel, 2e-3 * travel);
   const double slid = axis.dot(made.body.position[0] - made.body.rest[0]);
   EXPECT_NEAR(slid, travel, 2e-3 * travel);
@@ -279,12 +279,12 @@ TEST(Joints, ALedToolCarriesAPendulum) {
   led.path.displacement = {Vec3::Zero(), Vec3(0.004, 0, 0), Vec3(0.012, 0, 0), Vec3(0.016, 0, 0)};
   led.path.turn.assign(4, Vec3::Zero());
   scene.get<RigidParts>().manipulators = {led};
-  scene.get<Gravity>().acceleration = Vec3(0, 0, -kGravity);
+  scene.get<Gravity>().acceleration = Vec3(0, 0, -kFreeFall);
   join(scene, joint_of(JointKind::ball, "bob", "tool", Vec3(kSide, kSide, 10.5 * kSide)));
   const TimedCase made = testing::run_timed(std::move(body), scene);
   expect_books_close(made.result);
   const double mass = 1000 * 40 * std::pow(kSide, 3), tool = 1000 * 8 * std::pow(kSide, 3);
-  EXPECT_NEAR(made.history.column("tool force z")[1], (mass + tool) * kGravity, 1e-3);
+  EXPECT_NEAR(made.history.column("tool force z")[1], (mass + tool) * kFreeFall, 1e-3);
   EXPECT_GT(made.history.column("kinetic").back(), 0);
   const Vec3 at(kSide, kSide, 10.5 * kSide);
   EXPECT_LT((place_now(made.body, 1, at) - at - Vec3(0.016, 0, 0)).norm(), 1e-11);
@@ -296,7 +296,7 @@ TEST(Joints, AJointedPartLiesOnWhatItFallsOn) {
   scene.get<Contact>().on = true;
   scene.get<Contact>().damping = 1e-3;
   scene.get<Contact>().planes = {testing::plane_at(-0.05)};
-  scene.get<Gravity>().acceleration = Vec3(0, 0, -kGravity);
+  scene.get<Gravity>().acceleration = Vec3(0, 0, -kFreeFall);
   join(scene, joint_of(JointKind::hinge, "bar", "", kEnd, Vec3::UnitY()));
   const TimedCase made = testing::run_timed(block("bar", {10, 2, 2}), scene);
   // the lower corner of the end, 100 mm out and 10 mm below the axis at rest, is on the plane, 60 mm below the axis
@@ -316,7 +316,7 @@ Scene joined(const std::string& rest,
                      "scene.toml");
 }
 
-std::string parse_refusal(const std::string& rest) {
+std::string joint_refusal(const std::string& rest) {
   try {
     (void)joined(rest);
   } catch (const InputError& error) {
@@ -328,25 +328,25 @@ std::string parse_refusal(const std::string& rest) {
 TEST(Joints, WrongEntriesAreRefusedInOneLine) {
   const std::string at = "at = [0, 0, 0]\n", axis = "axis = [0, 0, 1]\n",
                     bar = "[[joint]]\nparts = [\"bar\"]\n";
-  EXPECT_THAT(parse_refusal(bar + at), HasSubstr("kind"));
-  EXPECT_THAT(parse_refusal(bar + "kind = \"hinje\"\n" + at), HasSubstr("hinge, slider, ball, motor"));
-  EXPECT_THAT(parse_refusal(bar + "kind = \"hinge\"\n" + at), HasSubstr("axis"));
-  EXPECT_THAT(parse_refusal(bar + "kind = \"hinge\"\naxis = [0, 0, 0]\n" + at), HasSubstr("axis"));
-  EXPECT_THAT(parse_refusal(bar + "kind = \"ball\"\n" + axis + at), HasSubstr("no axis"));
-  EXPECT_THAT(parse_refusal(bar + "kind = \"hinge\"\n" + axis), HasSubstr("\"at\""));
-  EXPECT_THAT(parse_refusal(bar + "kind = \"hinge\"\ntorque = \"1 N m\"\n" + axis + at),
+  EXPECT_THAT(joint_refusal(bar + at), HasSubstr("kind"));
+  EXPECT_THAT(joint_refusal(bar + "kind = \"hinje\"\n" + at), HasSubstr("hinge, slider, ball, motor"));
+  EXPECT_THAT(joint_refusal(bar + "kind = \"hinge\"\n" + at), HasSubstr("axis"));
+  EXPECT_THAT(joint_refusal(bar + "kind = \"hinge\"\naxis = [0, 0, 0]\n" + at), HasSubstr("axis"));
+  EXPECT_THAT(joint_refusal(bar + "kind = \"ball\"\n" + axis + at), HasSubstr("no axis"));
+  EXPECT_THAT(joint_refusal(bar + "kind = \"hinge\"\n" + axis), HasSubstr("\"at\""));
+  EXPECT_THAT(joint_refusal(bar + "kind = \"hinge\"\ntorque = \"1 N m\"\n" + axis + at),
               HasSubstr("of motors"));
-  EXPECT_THAT(parse_refusal(bar + "kind = \"motor\"\n" + axis + at), HasSubstr("angle_per_second"));
-  EXPECT_THAT(parse_refusal(bar + "kind = \"motor\"\ntorque = \"-1 N m\"\nangle_per_second = \"1 deg\"\n" +
+  EXPECT_THAT(joint_refusal(bar + "kind = \"motor\"\n" + axis + at), HasSubstr("angle_per_second"));
+  EXPECT_THAT(joint_refusal(bar + "kind = \"motor\"\ntorque = \"-1 N m\"\nangle_per_second = \"1 deg\"\n" +
                             axis + at),
               HasSubstr("above 0"));
-  EXPECT_THAT(parse_refusal("[[joint]]\nkind = \"ball\"\nparts = [\"bar\", \"bar\"]\n" + at),
+  EXPECT_THAT(joint_refusal("[[joint]]\nkind = \"ball\"\nparts = [\"bar\", \"bar\"]\n" + at),
               HasSubstr("with itself"));
-  EXPECT_THAT(parse_refusal("[[joint]]\nkind = \"ball\"\nparts = [\"a\", \"b\", \"c\"]\n" + at),
+  EXPECT_THAT(joint_refusal("[[joint]]\nkind = \"ball\"\nparts = [\"a\", \"b\", \"c\"]\n" + at),
               HasSubstr("one name or two"));
-  EXPECT_THAT(parse_refusal("[[joint]]\nkind = \"ball\"\nparts = []\n" + at), HasSubstr("one name or two"));
+  EXPECT_THAT(joint_refusal("[[joint]]\nkind = \"ball\"\nparts = []\n" + at), HasSubstr("one name or two"));
   const std::string ball = bar + "kind = \"ball\"\n" + at;
-  EXPECT_THAT(parse_refusal(ball + ball), HasSubstr("twice"));
+  EXPECT_THAT(joint_refusal(ball + ball), HasSubstr("twice"));
 }
 
 TEST(Joints, WhatCannotMoveIsRefusedByName) {
