@@ -94,13 +94,13 @@ double energy_swing(const Csv& history) {
   return swing / largest;
 }
 
-constexpr double kBarLength = 10 * kSide, kBarThick = 2 * kSide;  // of bars
-const Vec3 kEnd(0, kBarThick / 2, kBarThick / 2);
+constexpr double kPendulum = 10 * kSide, kPendulumThick = 2 * kSide;  // of bars
+const Vec3 kEnd(0, kPendulumThick / 2, kPendulumThick / 2);
 
 // m d and J + m d^2 of a bar hung at its end.
 double squared_swing() {
-  const double mass = 1000 * kBarLength * kBarThick * kBarThick, arm = kBarLength / 2;
-  const double inertia = mass / 12 * (kBarLength * kBarLength + kBarThick * kBarThick);
+  const double mass = 1000 * kPendulum * kPendulumThick * kPendulumThick, arm = kPendulum / 2;
+  const double inertia = mass / 12 * (kPendulum * kPendulum + kPendulumThick * kPendulumThick);
   return mass * kFreeFall * arm / (inertia + mass * arm * arm);
 }
 
@@ -119,7 +119,7 @@ TEST(Joints, APendulumSwingsInTheTimeOfTheCompoundPendulum) {
   EXPECT_LT((place_now(made.body, 0, kEnd) - kEnd).norm(), 1e-12);
   // what the hinge bears as the bar hangs: its weight, and what keeps it on its circle
   EXPECT_NEAR(made.history.column("bar joint force x")[1],
-              -1000 * kBarLength * kBarThick * kBarThick * kFreeFall, 0.01 * 0.4);
+              -1000 * kPendulum * kPendulumThick * kPendulumThick * kFreeFall, 0.01 * 0.4);
 }
 
 TEST(Joints, EnergySwingsWithTheSquareOfTheStep) {
