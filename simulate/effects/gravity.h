@@ -15,8 +15,8 @@ namespace flexel::simulate {
 class Gravity : public Effect {
  public:
   struct Source {
-    Vec3 at = Vec3::Zero();         // m, world frame
-    double mass = 0;                // kg; 0 of a part: its own
+    Vec3 at = Vec3::Zero();              // m, world frame
+    double mass = 0;                     // kg; 0 of a part: its own
     std::string part = {}, origin = {};  // whose centre of mass it is instead, where it goes; "scene.toml:3"
   };
   static constexpr double kNewton = 6.6743e-11;  // m^3/kg/s^2, CODATA 2018
