@@ -36,8 +36,8 @@ void write_body(const Body& body, const std::string& path, const BodyFileOptions
 // A frame without what lies in another file, for who goes through a series and has it.
 [[nodiscard]] Body read_frame(const std::string& path);
 
-// Gives `frame` the surface of `from`, which loses it and whose parts it must have: InputError(where, ...). Under which cells polygons lie
-// and the moments go along where the cells are the same; else they are empty.
+// Gives `frame` the surface of `from`, which loses it and whose parts it must have: InputError(where, ...).
+// Which cells lie under polygons, and the moments, go along where the cells are the same; else they are empty.
 void take_surface(Body& frame, Body& from, const std::string& where);
 
 // Tells surfaces apart by their vertices and polygons.
