@@ -379,8 +379,7 @@ void split_for_series(const std::vector<std::string>& files, Body& first, const 
   if (found.refinement) run.split(first, *found.refinement);
 }
 
-// Frames share one binding until the lattice changes (something was cut off) or breaks; only the first frame
-// holds the surface.
+// Frames share one binding until the lattice changes (something was cut off) or breaks, and the first one's surface.
 void map_series(const Arguments& arguments, Plan& plan, Progress& progress) {
   Run run(arguments, plan, progress);
   const std::vector<std::string> files = series_files(arguments.body);
@@ -394,7 +393,7 @@ void map_series(const Arguments& arguments, Plan& plan, Progress& progress) {
   for (std::size_t f = 0; f < files.size(); ++f) {
     check_stop();
     progress.stage(fmt::format("frame {} of {}", f + 1, files.size()));
-    Body next = read_body(files[f]);
+    Body next = f == 0 ? read_body(files[f]) : read_frame(files[f]);
     if (f == 0) {
       run.take_surface(next);
       use_field(next, arguments.map, plan.options);

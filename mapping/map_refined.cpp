@@ -144,7 +144,7 @@ RefinedSeries refinement_of_series(const Body& first, const std::vector<std::str
   for (const std::string& file : files) {
     check_stop();
     progress.update(0, "looking for coarse triangles in " + file);
-    Body next = read_body(file);
+    Body next = read_frame(file);
     if (body.parts.empty()) {
       next.surface = refined(first.surface, unsplit(first.surface));
       next.surface_cell_offsets = first.surface_cell_offsets;

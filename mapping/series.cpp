@@ -64,15 +64,4 @@ bool same_lattice(const Body& a, const Body& b) {
          a.broken == b.broken && a.connections == b.connections;
 }
 
-void take_surface(Body& next, Body& before, const std::string& file) {
-  if (next.parts.size() != before.parts.size())
-    throw InputError(file, "has other parts than the first frame: map it with its own surface");
-  next.surface = std::move(before.surface);
-  next.surface_cell_offsets = std::move(before.surface_cell_offsets);
-  next.surface_cells = std::move(before.surface_cells);
-  if (next.cell_elements == before.cell_elements) return;
-  next.surface_cell_offsets.clear();  // cells are renumbered: anchors come from the elements
-  next.surface_cells.clear();
-}
-
 }  // namespace flexel::mapping

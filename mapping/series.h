@@ -1,4 +1,4 @@
-// A series of bodies (.pvd): which files it lists, and where the surface of each frame goes.
+// A series of bodies (.pvd): which files it lists, and what is written for each.
 #pragma once
 #include <string>
 #include <vector>
@@ -20,9 +20,5 @@ namespace flexel::mapping {
 // True when the lattice of both is the same in all that a binding depends on: elements, cells, what is
 // broken.
 [[nodiscard]] bool same_lattice(const Body& a, const Body& b);
-
-// Gives the body of a frame the surface of the one before it, and the cells under it where they are the same. Throws
-// InputError(file, ...): it has other parts.
-void take_surface(Body& next, Body& before, const std::string& file);
 
 }  // namespace flexel::mapping

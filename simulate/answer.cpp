@@ -203,6 +203,8 @@ std::string factor(double share) {
 }
 
 std::string strength(const SimulateResult& result, const Body& body, const std::vector<Material>& materials) {
+  if (!result.stress && body.cell_count() == 0)
+    return "not known: model \"paper\" has no stresses, its connections pull from element to element";
   if (!result.stress) return "not known: no stresses of this model, or --no-stress";
   if (!(result.stress->value > 0)) return "nothing is stressed";
   std::vector<std::string> unknown;

@@ -28,7 +28,7 @@
 #include "simulate/estimate/coarsen.h"
 #include "simulate/estimate/error_bars.h"
 #include "simulate/estimate/stress_singularity.h"
-#include "simulate/events/fuse.h"
+#include "simulate/events/fused.h"
 #include "simulate/matter/fragments.h"
 #include "simulate/matter/stress.h"
 #include "simulate/memory.h"
@@ -38,6 +38,7 @@
 #include "simulate/probes/probes.h"
 #include "simulate/probes/report.h"
 #include "simulate/quadratic/quadratic_run.h"
+#include "simulate/scene/coming_parts.h"
 #include "simulate/scene/scene.h"
 #include "simulate/scene/scene_checks.h"
 #include "simulate/thermal/free_strain.h"
@@ -422,7 +423,7 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   body.cell_columns.erase(kFreeStrainColumn);  // a run's own
   progress.stage("simulate");
   drop_stuck_places(body, scene, progress);
-  check_actions(scene, body, progress);
+  check_actions(scene.events.empty() ? scene : at_the_beginning(scene, body), body, progress);
   refuse_heat(scene);
   refuse_beyond_memory(body, scene);
   if (options.explain) explain_memory(body, scene, progress);

@@ -2,7 +2,7 @@
 """Runs the commands of a page, block by block in one folder; writes what each prints into the ```text block that follows it, and the pictures
 that the page shows of what they draw.
 
-    PATH=build/release/bin:$PATH bench/paper/page.py [PAGE.md ...]      (docs/guide/paper.md and the pages of the samples)
+    PATH=build/release/bin:$PATH bench/paper/page.py [PAGE.md ...]      (docs/guide/paper.md, paper-figures.md and the pages of the samples)
 """
 
 import pathlib
@@ -14,7 +14,7 @@ import tempfile
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 SAMPLES = ["bracket", "cantilever", "carved", "dented", "fork", "frozen", "gripped", "kneaded", "squeezed", "supports", "swing", "torn"]
-PAGES = [SOURCE / "docs/guide/paper.md"] + [SOURCE / f"samples/{name}/README.md" for name in SAMPLES]
+PAGES = [SOURCE / "docs/guide/paper.md", SOURCE / "docs/guide/paper-figures.md"] + [SOURCE / f"samples/{name}/README.md" for name in SAMPLES]
 PICTURE = re.compile(r"!\[[^]]*\]\((?:[^)]*/)?([^/)]+\.png)\)")
 BLOCK = re.compile(r"^```sh\n(.*?)^```\n(?:\n```text\n(.*?)^```\n)?", re.M | re.S)
 

@@ -67,6 +67,12 @@ std::vector<double> scalars(const Column& column, std::optional<int> component) 
   return values;
 }
 
+std::string no_stresses(const Body& body, const std::string& name) {
+  const bool asked = name.find("stress") != std::string::npos || name.find("mises") != std::string::npos ||
+                     name.find("principal") != std::string::npos;
+  return asked && body.cell_count() == 0 ? " (model \"paper\" has no stresses)" : "";
+}
+
 Attribute strain(const Body& body) {
   return {body.cell_count() == 0 ? Attribute::At::elements : Attribute::At::cells, strains(body)};
 }

@@ -24,6 +24,9 @@ struct Attribute {
 [[nodiscard]] std::optional<Attribute> body_attribute(const Body& body, const std::string& name);
 [[nodiscard]] std::vector<std::string> body_attribute_names(const Body& body);
 
+// Why a body without cells has none of that name, " (model ...)", where the name is one of stresses; else nothing.
+[[nodiscard]] std::string no_stresses(const Body& body, const std::string& name);
+
 // strains() of formats/lattice/fields.h, of cells or elements.
 [[nodiscard]] Attribute strain(const Body& body);
 

@@ -221,8 +221,7 @@ Panel make_panel(const PictureSubject& subject, const PictureOptions& options, c
     draw_surface_file(subject.surface, options, by, panel);
   } else if (options.show == PictureOptions::Show::surface) {
     if (subject.body->surface.polygon_count() == 0)
-      throw InputError(subject.where,
-                       "carries no surface (a frame of a series): --cells or --elements draws its lattice");
+      throw InputError(subject.where, "carries no surface: --cells or --elements draws its lattice");
     draw_body_surface(*subject.body, options, by, progress, panel);
   } else {
     draw_lattice(*subject.body, options, by, panel);

@@ -57,8 +57,9 @@ ColourBy colour_by(const std::vector<PictureSubject>& subjects, const PictureOpt
     every = false;
     if (name == "thickness" && options.show != PictureOptions::Show::elements) continue;
     const std::vector<std::string> names = common_names(subjects, options.show);
-    throw InputError(subject.where, fmt::format("has no attribute \"{}\" to colour by; --color takes {}{}",
-                                                name, fmt::join(names, ", "), did_you_mean(name, names)));
+    throw InputError(subject.where, fmt::format("has no attribute \"{}\" to colour by{}; --color takes {}{}",
+                                                name, subject.body ? no_stresses(*subject.body, name) : "",
+                                                fmt::join(names, ", "), did_you_mean(name, names)));
   }
   return {name, !every};
 }

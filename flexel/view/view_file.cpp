@@ -143,8 +143,9 @@ void add_asked(const Body* body, const Surface& surface, const ViewOptions& opti
     if (body != nullptr) known.insert(known.begin(), "displacement");
     known.emplace_back("none");
     throw NoSuchAttribute(
-        where, fmt::format("has no attribute \"{}\" to colour by; --color takes {}{}", options.colour,
-                           fmt::join(known, ", "), did_you_mean(options.colour, known)));
+        where, fmt::format("has no attribute \"{}\" to colour by{}; --color takes {}{}", options.colour,
+                           body ? picture::no_stresses(*body, options.colour) : "", fmt::join(known, ", "),
+                           did_you_mean(options.colour, known)));
   }
   names.push_back(options.colour);
 }
@@ -197,13 +198,13 @@ void show_body(const Body& body, const ViewOptions& options, const std::string& 
   set_largest(shown, *file.surface);
 }
 
-// Frames share one binding until the lattice changes; only the first holds the surface.
+// Frames share one binding until the lattice changes, and the first one's surface.
 void show_series(const std::string& pvd, const ViewOptions& options, ViewFile& file, Progress& progress) {
   const std::vector<std::string> files = mapping::series_files(pvd);
   file.times = mapping::series_times(pvd);
   Body body = read_body(files.front());
   if (body.surface.polygon_count() == 0)
-    throw InputError(files.front(), "carries no surface: the first frame of a series should");
+    throw InputError(files.front(), "carries no surface: take a series of a body that has one");
   add_facts(body, file);
   mapping::MapOptions how;
   how.method = mapping::default_method(body);
@@ -212,7 +213,7 @@ void show_series(const std::string& pvd, const ViewOptions& options, ViewFile& f
     mapping::take_refined(body, refined(body.surface, *found.refinement), *found.refinement);
   file.surface = begin_surface(body.surface, file);
   std::vector<std::string> names = field_names(&body, body.surface);
-  const Body last = read_body(files.back());  // it may have what the first has not
+  const Body last = read_frame(files.back());  // it may have what the first has not
   for (std::string& name : field_names(&last, body.surface))
     if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(std::move(name));
   add_asked(&body, body.surface, options, files.front(), names);
@@ -221,8 +222,8 @@ void show_series(const std::string& pvd, const ViewOptions& options, ViewFile& f
   for (std::size_t f = 0; f < files.size(); ++f) {
     progress.update(static_cast<double>(f) / static_cast<double>(files.size()), files[f]);
     if (f > 0) {
-      Body next = read_body(files[f]);
-      mapping::take_surface(next, body, files[f]);
+      Body next = read_frame(files[f]);
+      take_surface(next, body, files[f]);
       if (!mapping::same_lattice(next, body)) binding.reset();
       body = std::move(next);
     }

@@ -170,6 +170,15 @@ std::uint64_t hash_from_json(const Cursor& json) {
   return std::stoull(text, nullptr, 16);
 }
 
+// A file of the same folder: anybody may have written the name.
+SurfaceBeside beside_from_json(const Cursor& json) {
+  SurfaceBeside beside{json["file"].text(), hash_from_json(json["hash"])};
+  if (beside.file.empty() || beside.file == "." || beside.file == ".." ||
+      beside.file.find('/') != std::string::npos)
+    json["file"].fail("is no name of a file in its folder");
+  return beside;
+}
+
 SurfaceSource source_from_json(const Cursor& json, PackedSource& packed) {
   constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 40;
   SurfaceSource source;
@@ -216,7 +225,8 @@ std::vector<std::string> materials_of(const Body& body) {
   return materials;
 }
 
-std::string metadata_to_json(const Body& body, bool with_surface, const std::vector<PackedSource>& sources) {
+std::string metadata_to_json(const Body& body, bool with_surface, const std::vector<PackedSource>& sources,
+                             const std::optional<SurfaceBeside>& beside) {
   Json parts = Json::array(), materials = Json::array(), notes = Json::array();
   for (const Part& part : body.parts) parts.push_back(part_to_json(part));
   for (const std::string& material : materials_of(body)) materials.push_back(text_to_json(material));
@@ -227,6 +237,9 @@ std::string metadata_to_json(const Body& body, bool with_surface, const std::vec
                {"notes", notes},
                {"surface", nullptr}};
   if (with_surface) json["surface"] = surface_to_json(body.surface, sources);
+  if (beside)
+    json["surface_beside"] = {{"file", text_to_json(beside->file)},
+                              {"hash", fmt::format("{:016x}", beside->hash)}};
   std::string text = json.dump();
   // Readers that look for the end of the appended data must not find it in a name.
   for (std::size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at))
@@ -250,6 +263,7 @@ Metadata metadata_from_json(const std::string& text, const std::string& where) {
   }
   metadata.with_surface = !surface.null();
   if (metadata.with_surface) surface_from_json(surface, metadata);
+  if (root.has("surface_beside")) metadata.beside = beside_from_json(root["surface_beside"]);
   return metadata;
 }
 

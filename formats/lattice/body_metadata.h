@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "formats/lattice/body.h"
+#include "formats/lattice/body_file.h"
 
 namespace flexel {
 
@@ -15,13 +16,15 @@ struct PackedSource {
   std::uint64_t header_size = 0;           // bytes in "surface_source_headers"
 };
 
-// `sources` is empty when the surface is not embedded.
+// `sources` is empty when the surface is not embedded; it is `beside` then, or there is none.
 [[nodiscard]] std::string metadata_to_json(const Body& body, bool with_surface,
-                                           const std::vector<PackedSource>& sources);
+                                           const std::vector<PackedSource>& sources,
+                                           const std::optional<SurfaceBeside>& beside);
 
 struct Metadata {
   Body body;  // parts, notes and the surface's parts and sources; no arrays
   bool with_surface = false;
+  std::optional<SurfaceBeside> beside = {};                       // where it is instead
   std::vector<std::pair<std::uint32_t, std::string>> face_names;  // of the faces that have one
   std::vector<PackedSource> sources;
 };

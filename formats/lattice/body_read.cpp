@@ -2,9 +2,12 @@
 // part, material, offsets and types repeat other fields and are not read back (only their sizes are checked).
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <filesystem>
 #include <string_view>
 
 #include "base/error.h"
+#include "base/files/named_file.h"
 #include "base/parallel.h"
 #include "base/resources.h"
 #include "formats/lattice/body_file.h"
@@ -158,13 +161,12 @@ void read_moments(const vtu::File& file, Body& body) {
     body.moments.insert(body.moments.end(), each.begin(), each.end());
 }
 
-}  // namespace
+struct ReadBody {
+  Body body;
+  std::optional<SurfaceBeside> beside;
+};
 
-Body read_body(const std::string& path) {
-  return read_body(read_all(path), path == "-" ? "stdin" : path);
-}
-
-Body read_body(Bytes bytes, const std::string& where) {
+ReadBody read_file(Bytes bytes, const std::string& where) {
   if (!looks_like_body(bytes))
     throw InputError(where,
                      "is not a body file: one written by flexel-voxelize or flexel-simulate is needed");
@@ -178,7 +180,52 @@ Body read_body(Bytes bytes, const std::string& where) {
   read_moments(file, body);
   if (metadata.with_surface) read_surface(file, metadata, body);
   check(body, where);
-  return body;
+  return {std::move(body), std::move(metadata.beside)};
+}
+
+void take_surface_beside(Body& frame, const SurfaceBeside& beside, const std::string& path) {
+  const std::string file = (std::filesystem::path(path).parent_path() / beside.file).string();
+  const auto fail = [&](const std::string& what) {
+    throw InputError(path, fmt::format("is a frame of a series whose surface is in \"{}\" beside it, {}",
+                                       beside.file, what));
+  };
+  refuse_device(file, path);
+  std::error_code ignored;
+  if (!std::filesystem::exists(file, ignored)) fail("which is missing: copy that along");
+  Body from = read_file(read_all(file), file).body;
+  if (surface_hash(from.surface) != beside.hash) fail("which has another one now: take that of the same run");
+  take_surface(frame, from, path);
+}
+
+}  // namespace
+
+Body read_body(const std::string& path) {
+  if (path == "-") return read_body(read_all(path), "stdin");
+  ReadBody read = read_file(read_all(path), path);
+  if (read.beside) take_surface_beside(read.body, *read.beside, path);
+  return std::move(read.body);
+}
+
+Body read_body(Bytes bytes, const std::string& where) {
+  return read_file(std::move(bytes), where).body;
+}
+
+Body read_frame(const std::string& path) {
+  return read_body(read_all(path), path);
+}
+
+void take_surface(Body& frame, Body& from, const std::string& where) {
+  const auto same = [](const Part& a, const Part& b) { return a.name == b.name; };
+  if (!std::equal(frame.parts.begin(), frame.parts.end(), from.parts.begin(), from.parts.end(), same))
+    throw InputError(where, "has other parts than the frame with the surface: map it with its own surface");
+  frame.surface = std::move(from.surface);
+  const bool same_cells = frame.cell_elements == from.cell_elements;
+  // else cells are renumbered: anchors come from the elements
+  frame.surface_cell_offsets =
+      same_cells ? std::move(from.surface_cell_offsets) : std::vector<std::uint32_t>();
+  frame.surface_cells = same_cells ? std::move(from.surface_cells) : std::vector<std::uint32_t>();
+  frame.moment_cells = same_cells ? std::move(from.moment_cells) : std::vector<std::uint32_t>();
+  frame.moments = same_cells ? std::move(from.moments) : std::vector<double>();
 }
 
 bool looks_like_body(std::span<const std::byte> bytes) {

@@ -2,6 +2,7 @@
 // VTK's corner order, displacement, part and material of each cell) are made a chunk at a time.
 // docs/reference/body-file.md gives every array.
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <stdexcept>
 
@@ -48,10 +49,10 @@ bool has_surface(const Surface& surface) {
          !surface.parts.empty() || !surface.sources.empty();
 }
 
-Workspace prepare(const Body& body, bool with_surface) {
+Workspace prepare(const Body& body, const BodyFileOptions& options, bool with_surface) {
   Workspace work;
   if (with_surface) pack_sources(body.surface, work);
-  const std::string metadata = metadata_to_json(body, with_surface, work.sources);
+  const std::string metadata = metadata_to_json(body, with_surface, work.sources, options.surface_beside);
   work.metadata.assign(metadata.begin(), metadata.end());
   work.element_part = element_parts(body);
   work.cell_part = cell_parts(body);
@@ -195,13 +196,13 @@ void require_sizes(const Body& body) {
 
 void write_to(OutputFile& output, const Body& body, const BodyFileOptions& options) {
   require_sizes(body);
-  const bool with_surface = options.embed_surface && has_surface(body.surface);
-  const Workspace work = prepare(body, with_surface);
+  const bool with_surface = !options.surface_beside && has_surface(body.surface);
+  const Workspace work = prepare(body, options, with_surface);
   std::vector<vtu::Array> arrays;
   arrays.push_back(array_of(Section::field, names::version, work.version));
   arrays.push_back(array_of(Section::field, names::metadata, work.metadata));
   if (with_surface) add_surface(body, work, arrays);
-  if (options.embed_surface) add_moments(body, arrays);
+  if (!options.surface_beside) add_moments(body, arrays);
   add_elements(body, work, arrays);
   add_cells(body, work, arrays);
   vtu::write(output, body.element_count(), body.cell_count() + work.vertex_elements.size(), arrays,
@@ -221,6 +222,14 @@ Bytes body_bytes(const Body& body) {
   OutputFile output(bytes);
   write_to(output, body, {});
   return bytes;
+}
+
+std::uint64_t surface_hash(const Surface& surface) {
+  const auto bytes_of = [](const auto& values) { return std::as_bytes(std::span(values)); };
+  const std::array<std::uint64_t, 3> hashes = {content_hash(bytes_of(surface.vertices)),
+                                               content_hash(bytes_of(surface.polygon_offsets)),
+                                               content_hash(bytes_of(surface.polygon_vertices))};
+  return content_hash(bytes_of(hashes));
 }
 
 }  // namespace flexel

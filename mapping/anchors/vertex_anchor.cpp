@@ -358,8 +358,8 @@ VertexAnchor anchor_at_element(const Body& body, std::uint32_t part, std::uint32
 VertexAnchors locate_vertices(const Body& body) {
   if (body.surface.vertices.empty())
     throw InputError(
-        "the body carries no surface to map onto; only frame 0 of a series does: take the body that "
-        "flexel-voxelize or flexel-simulate wrote");
+        "the body carries no surface to map onto: take the body that "
+        "flexel-voxelize or flexel-simulate wrote, a frame of a series by its name");
   for (const Part& part : body.parts)
     if (part.element_begin == part.element_end)
       throw InputError("part \"" + part.name + "\" has no elements: voxelize it with a smaller --size");

@@ -200,6 +200,13 @@ void Bonds::soften(const Problem& problem) {
     if (soft[e] > 0) frequency_ = std::max(frequency_, soft[e] / resists.mass[e]);
 }
 
+bool Bonds::holds(std::uint32_t one, std::uint32_t other, const Body& body) const {
+  const std::array<std::string, 2> names = {body.parts[std::min(one, other)].name,
+                                            body.parts[std::max(one, other)].name};
+  return std::any_of(parts_.begin(), parts_.end(),
+                     [&](const BondedParts& each) { return each.parts == names; });
+}
+
 std::string Bonds::why() const {
   return fmt::format("{} pair(s) of parts touch or are named by [[bond]]", parts_.size());
 }

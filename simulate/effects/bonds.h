@@ -38,6 +38,8 @@ class Bonds : public Effect {
   [[noreturn]] static void refuse_apart(const Named& named);
   static void parse(TableReader& scene, Parameters& parameters);
   [[nodiscard]] static std::optional<Bonds> make(const Parameters& parameters, const Problem& problem);
+  // Whether parts of these numbers are bonded with one another.
+  [[nodiscard]] bool holds(std::uint32_t one, std::uint32_t other, const Body& body) const;
   [[nodiscard]] std::string why() const override;
 
   [[nodiscard]] EnergyAccount account() const override { return EnergyAccount::work; }

@@ -12,6 +12,7 @@
 // their rows, which decides the last bits of the sums and nothing else.
 #pragma once
 #include <chrono>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -44,6 +45,13 @@ struct EnergyTransfer {
   const char* from = "";
   EnergyAccount kind = EnergyAccount::work;
   double energy = 0;
+};
+
+// W, of the account of that name, by what acts on no element.
+struct EffectPower {
+  const char* account = "";
+  EnergyAccount kind = EnergyAccount::work;
+  double power = 0;
 };
 
 // What an effect makes of a step that is to be taken.
@@ -127,6 +135,8 @@ class Effect {
   }
   // Asked before every step: whether its length has to be chosen anew now.
   [[nodiscard]] virtual bool needs_step_recheck(const State&) { return false; }
+  // s: a step that it learns its bound from, where the scene gives none.
+  [[nodiscard]] virtual double first_step() const { return std::numeric_limits<double>::infinity(); }
   virtual void finish_step(State&, const StepDone&) {}
   // Of free rigid parts at the beginning of the last step, between the velocities before and after it;
   // `half_kick`: those before it were of that very time.
@@ -168,6 +178,8 @@ class Effect {
                                                            const std::vector<Vec3>& /*unbalanced*/) {
     return {};
   }
+  // With the velocities before the last step's forces, or after them.
+  [[nodiscard]] virtual std::vector<EffectPower> powers(bool /*after*/) const { return {}; }
   // Since they were asked for last; the energy history does before every step.
   [[nodiscard]] virtual std::vector<EnergyTransfer> take_transfers(const State&) { return {}; }
 

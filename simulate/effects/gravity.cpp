@@ -6,6 +6,7 @@
 #include "base/math/greatest.h"
 #include "base/parallel.h"
 #include "simulate/gravitation/gravity_tree.h"
+#include "simulate/input/part_names.h"
 #include "simulate/matter/interpolation_weights.h"
 #include "simulate/matter/masses.h"
 
@@ -19,11 +20,19 @@ constexpr double kResolve = 60;             // steps of at most 2 / 60 rad of th
 Gravity::Source parse_source(const SceneValue& value, const TableReader& parent) {
   TableReader reader(value, parent.file(), "source of [gravity]");
   Gravity::Source source;
-  source.at =
-      reader.to_vector(reader.require("at", "[\"0 m\", \"0 m\", \"-6371 km\"]"), Dimension::length, "at");
-  source.mass = reader.to_quantity(reader.require("mass", "\"5.97e24 kg\""), Dimension::mass, "mass");
+  source.origin = reader.place();
+  source.part = reader.text("part").value_or("");
+  const SceneValue* at = reader.find("at");
+  if (at && !source.part.empty())
+    reader.fail(at->line, "a source is \"at\" a point or a \"part\": give one of them");
+  if (source.part.empty())
+    source.at =
+        reader.to_vector(reader.require("at", "[\"0 m\", \"0 m\", \"-6371 km\"]"), Dimension::length, "at");
+  if (source.part.empty() || reader.find("mass")) {
+    source.mass = reader.to_quantity(reader.require("mass", "\"5.97e24 kg\""), Dimension::mass, "mass");
+    if (!(source.mass > 0)) reader.fail("\"mass\" of a source needs to be above 0");
+  }
   reader.finish();
-  if (!(source.mass > 0)) reader.fail("\"mass\" of a source needs to be above 0");
   return source;
 }
 
@@ -63,6 +72,7 @@ std::optional<Gravity> Gravity::make(const Parameters& parameters, const Problem
   made.mass_ = problem.duration ? lumped_masses(problem) : element_masses(problem);
   for (std::size_t e = 0; e < made.mass_.size(); ++e)
     made.first_moment_ += made.mass_[e] * problem.body.rest[e];
+  for (Source& source : made.sources_) made.of_parts_.push_back(made.find_part(source, problem.body));
   if (!made.needs_time()) return made;
   made.rest_ = problem.body.rest;
   made.radius_.resize(made.rest_.size());
@@ -72,6 +82,18 @@ std::optional<Gravity> Gravity::make(const Parameters& parameters, const Problem
   for (std::uint32_t e = 0; made.mutual_ && e < made.mass_.size(); ++e)
     if (made.mass_[e] > 0) made.massive_.push_back(e);
   return made;
+}
+
+// Its mass, where the scene says none, is the part's.
+Gravity::OfPart Gravity::find_part(Source& source, const Body& body) const {
+  OfPart of;
+  if (source.part.empty()) return of;
+  const Part& part = body.parts[require_part(body, source.part, source.origin)];
+  of.begin = part.element_begin;
+  of.end = part.element_end;
+  for (std::uint32_t e = of.begin; e < of.end; ++e) of.mass += mass_[e];
+  if (!(source.mass > 0)) source.mass = of.mass;
+  return of;
 }
 
 std::string Gravity::why() const {
@@ -98,11 +120,23 @@ Attraction Gravity::attraction(const State& state) const {
   return massive_.size() > kMostByPairs ? attraction_by_tree(all, kOpening) : attraction_by_pairs(all);
 }
 
-Pull Gravity::pull(const State& state, std::size_t element) const {
+std::vector<Vec3> Gravity::source_places(const State& state) const {
+  std::vector<Vec3> places;
+  for (std::size_t s = 0; s < sources_.size(); ++s) {
+    const OfPart& of = of_parts_[s];
+    Vec3 moment = Vec3::Zero();
+    for (std::uint32_t e = of.begin; e < of.end; ++e) moment += mass_[e] * (rest_[e] + state.displacement[e]);
+    places.push_back(of.mass > 0 ? Vec3(moment / of.mass) : sources_[s].at);
+  }
+  return places;
+}
+
+Pull Gravity::pull(const std::vector<Vec3>& places, const State& state, std::size_t element) const {
   Pull sum;
-  for (const Source& source : sources_) {
+  for (std::size_t s = 0; s < sources_.size(); ++s) {
+    if (element >= of_parts_[s].begin && element < of_parts_[s].end) continue;
     const Pull each =
-        pull_of(source.mass, source.at - rest_[element] - state.displacement[element], radius_[element]);
+        pull_of(sources_[s].mass, places[s] - rest_[element] - state.displacement[element], radius_[element]);
     sum.field += each.field;
     sum.potential += each.potential;
     sum.tide += each.tide;
@@ -110,13 +144,31 @@ Pull Gravity::pull(const State& state, std::size_t element) const {
   return sum;
 }
 
+void Gravity::add_source_forces(const State& state, std::vector<Vec3>& forces) const {
+  const std::vector<Vec3> places = source_places(state);
+  parallel_for_each(mass_.size(), [&](std::size_t e) {
+    forces[e] += (constant_ * mass_[e]) * pull(places, state, e).field;
+  });
+  for (std::size_t s = 0; s < sources_.size(); ++s) {
+    const OfPart& of = of_parts_[s];
+    if (!(of.mass > 0)) continue;
+    Vec3 drawn = Vec3::Zero();  // by all that it draws
+    for (std::size_t e = 0; e < mass_.size(); ++e)
+      if (e < of.begin || e >= of.end)
+        drawn -= (constant_ * mass_[e]) *
+                 pull_of(sources_[s].mass, places[s] - rest_[e] - state.displacement[e], radius_[e]).field;
+    for (std::uint32_t e = of.begin; e < of.end; ++e) forces[e] += mass_[e] / of.mass * drawn;
+  }
+}
+
 double Gravity::energy(const State& state) {
   double energy = -state.share * parallel_sum<double>(mass_.size(), [&](std::size_t e) {
     return mass_[e] * acceleration_.dot(state.displacement[e]);
   });
   if (!sources_.empty())
-    energy += parallel_sum<double>(
-        mass_.size(), [&](std::size_t e) { return constant_ * mass_[e] * pull(state, e).potential; });
+    energy += parallel_sum<double>(mass_.size(), [&, places = source_places(state)](std::size_t e) {
+      return constant_ * mass_[e] * pull(places, state, e).potential;
+    });
   if (mutual_) {
     const Attraction mutual = attraction(state);
     for (std::size_t i = 0; i < massive_.size(); ++i)
@@ -129,9 +181,7 @@ void Gravity::add_forces(const State& state, std::vector<Vec3>& forces) {
   if (acceleration_ != Vec3::Zero())
     parallel_for_each(mass_.size(),
                       [&](std::size_t e) { forces[e] += (state.share * mass_[e]) * acceleration_; });
-  if (!sources_.empty())
-    parallel_for_each(mass_.size(),
-                      [&](std::size_t e) { forces[e] += (constant_ * mass_[e]) * pull(state, e).field; });
+  if (!sources_.empty()) add_source_forces(state, forces);
   if (!mutual_) return;
   const Attraction mutual = attraction(state);
   parallel_for_each(massive_.size(), [&](std::size_t i) {
@@ -144,10 +194,20 @@ void Gravity::add_forces(const State& state, std::vector<Vec3>& forces) {
 double Gravity::added_frequency(const State& state, const std::vector<double>&) {
   if (!needs_time()) return 0;
   double largest = 0;
-  if (!sources_.empty())
+  if (!sources_.empty()) {
+    const std::vector<Vec3> places = source_places(state);
     largest += parallel_sum<Greatest>(mass_.size(), [&](std::size_t e) {
-                 return Greatest{pull(state, e).tide};
+                 return Greatest{pull(places, state, e).tide};
                }).value;
+    for (const OfPart& of : of_parts_)  // the part as a whole, by all that it draws
+      if (of.mass > 0)
+        largest += parallel_sum<double>(
+                       mass_.size(),
+                       [&](std::size_t e) {
+                         return e < of.begin || e >= of.end ? mass_[e] * pull(places, state, e).tide : 0;
+                       }) /
+                   of.mass;
+  }
   if (mutual_) {
     const Attraction mutual = attraction(state);
     double most = 0;
@@ -164,9 +224,12 @@ void Gravity::report(const State& state, const std::vector<Vec3>&, SimulateResul
   for (std::size_t e = 0; e < mass_.size(); ++e) first_moment += mass_[e] * state.displacement[e];
   total.force = state.share * mass * acceleration_;
   total.moment = state.share * first_moment.cross(acceleration_);
-  for (std::size_t e = 0; !sources_.empty() && e < mass_.size(); ++e)
-    add_at((constant_ * mass_[e]) * pull(state, e).field, rest_[e] + state.displacement[e], total.force,
-           total.moment);
+  if (!sources_.empty()) {
+    std::vector<Vec3> forces(mass_.size(), Vec3::Zero());
+    add_source_forces(state, forces);
+    for (std::size_t e = 0; e < mass_.size(); ++e)
+      add_at(forces[e], rest_[e] + state.displacement[e], total.force, total.moment);
+  }
   result.loads.push_back(total);  // the mutual part sums up to 0
 }
 

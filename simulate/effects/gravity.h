@@ -2,7 +2,8 @@
 // placement on that of the element's voxel. Three kinds, which add up (Jansson and Vergeest, section 3.2 and
 // equations 1 and 13):
 //     uniform   F = m g, energy -m g . u
-//     source    F = G m M (s - x) / |s - x|^3, energy -G m M / |s - x|, for each mass M at a fixed point s
+//     source    F = G m M (s - x) / |s - x|^3, energy -G m M / |s - x|, for each mass M at a point s: one that is given,
+//               or the centre of mass of a part, which is drawn by as much, evenly by mass, and not by itself
 //     mutual    the same of every element on every other (simulate/gravitation/gravity_sum.h)
 // The last two act in timed runs only.
 #pragma once
@@ -14,8 +15,9 @@ namespace flexel::simulate {
 class Gravity : public Effect {
  public:
   struct Source {
-    Vec3 at = Vec3::Zero();  // m, world frame; it does not move
-    double mass = 0;         // kg
+    Vec3 at = Vec3::Zero();              // m, world frame
+    double mass = 0;                     // kg; 0 of a part: its own
+    std::string part = {}, origin = {};  // whose centre of mass it is instead, where it goes; "scene.toml:3"
   };
   static constexpr double kNewton = 6.6743e-11;  // m^3/kg/s^2, CODATA 2018
   struct Parameters {
@@ -41,13 +43,23 @@ class Gravity : public Effect {
   void report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) override;
 
  private:
+  // A source that is a part: its elements, and their mass [kg].
+  struct OfPart {
+    std::uint32_t begin = 0, end = 0;
+    double mass = 0;
+  };
+  [[nodiscard]] OfPart find_part(Source& source, const Body& body) const;
   // The elements with mass, where they are now.
   [[nodiscard]] PointMasses points(const State& state) const;
   [[nodiscard]] Attraction attraction(const State& state) const;
-  [[nodiscard]] Pull pull(const State& state, std::size_t element) const;  // of the sources
+  // Of the sources, which are at `places` [m].
+  [[nodiscard]] Pull pull(const std::vector<Vec3>& places, const State& state, std::size_t element) const;
+  [[nodiscard]] std::vector<Vec3> source_places(const State& state) const;
+  void add_source_forces(const State& state, std::vector<Vec3>& forces) const;
 
   Vec3 acceleration_ = Vec3::Zero();
   std::vector<Source> sources_;
+  std::vector<OfPart> of_parts_;  // (sources_) without elements: at a point that is given
   bool mutual_ = false;
   double constant_ = kNewton;
   std::vector<double> mass_;            // (elements) kg

@@ -107,16 +107,45 @@ Pose RigidParts::Moving::pose_at(double time) const {
   return (led->live ? led->live->path : led->path).at(time, body.centre);
 }
 
+std::optional<std::size_t> RigidParts::number_of(std::uint32_t part) const {
+  for (std::size_t m = 0; m < moving_.size(); ++m)
+    if (moving_[m].body.part == part) return m;
+  return std::nullopt;
+}
+
+std::vector<const RigidBody*> RigidParts::join(std::shared_ptr<JointSystem> joints) {
+  joints_ = std::move(joints);
+  std::vector<const RigidBody*> bodies;
+  for (const Moving& moving : moving_) bodies.push_back(&moving.body);
+  return bodies;
+}
+
+// As they are.
+std::vector<JointedBody> RigidParts::as_jointed() const {
+  std::vector<JointedBody> bodies;
+  for (const Moving& moving : moving_)
+    bodies.push_back(
+        {&moving.body, moving.led.has_value(), moving.body.momentum, moving.body.spin, moving.body.pose});
+  return bodies;
+}
+
 void RigidParts::start(State& state) {
   for (Moving& moving : moving_) {
     RigidBody& body = moving.body;
     take_up(body, *body_, mass_, state.displacement, state.velocity);
-    if (moving.led) {
-      body.momentum = body.spin = Vec3::Zero();
-      move_to(body, moving.pose_at(*state.time), 0, state.displacement, state.velocity);
-    } else {
-      move_to(body, body.pose, 0, state.displacement, state.velocity);
+    if (!moving.led) continue;
+    body.momentum = body.spin = Vec3::Zero();
+    body.pose = moving.pose_at(*state.time);
+  }
+  std::vector<JointedBody> jointed = as_jointed();
+  if (joints_) joints_->begin(jointed, true);
+  for (std::size_t m = 0; m < moving_.size(); ++m) {
+    RigidBody& body = moving_[m].body;
+    if (!moving_[m].led) {
+      body.momentum = jointed[m].momentum;
+      body.spin = jointed[m].spin;
     }
+    move_to(body, body.pose, 0, state.displacement, state.velocity);
   }
 }
 
@@ -126,6 +155,8 @@ void RigidParts::begin(const State& state) {
     std::copy(state.velocity.begin() + moving.body.begin, state.velocity.begin() + moving.body.end,
               moving.velocity.begin());
   }
+  std::vector<JointedBody> jointed = as_jointed();
+  if (joints_) joints_->begin(jointed, false);
 }
 
 // What leads it, from the impulse and the moment about its centre [N s, N m s] that everything else gave it on
@@ -201,24 +232,32 @@ void RigidParts::end_implicit_step(const State& state, const StepDone& done,
 }
 
 void RigidParts::finish_step(State& state, const StepDone& done) {
-  for (Moving& moving : moving_) {
-    RigidBody& body = moving.body;
+  std::vector<JointedBody> after = as_jointed();
+  for (std::size_t m = 0; m < moving_.size(); ++m) {
+    Moving& moving = moving_[m];
+    const RigidBody& body = moving.body;
     moving.before = {body.pose, body.momentum, body.spin};
-    Vec3 impulse = Vec3::Zero(), turning = Vec3::Zero();
     for (std::uint32_t e = body.begin; e < body.end; ++e) {
       const Vec3 took = done.mass[e] * (state.velocity[e] - moving.velocity[e - body.begin]);
-      impulse += took;
-      turning += (body.pose.rotation * body.arms[e - body.begin]).cross(took);
+      after[m].momentum += took;
+      after[m].spin += (body.pose.rotation * body.arms[e - body.begin]).cross(took);
       moving.support[e - body.begin] = state.velocity[e];  // as if free
     }
+    if (moving.led) after[m].next = moving.pose_at(*state.time);
+  }
+  if (joints_) joints_->advance(after, done.kick, done.drift);
+  for (std::size_t m = 0; m < moving_.size(); ++m) {
+    Moving& moving = moving_[m];
+    RigidBody& body = moving.body;
+    const JointedBody& now = after[m];
     if (moving.led) {
-      const Pose next = moving.pose_at(*state.time);
-      moving.feel(next, body.pose.rotation, impulse, turning, done);
-      move_to(body, next, done.drift, state.displacement, state.velocity);
+      moving.feel(now.next, body.pose.rotation, now.momentum - body.momentum, now.spin - body.spin, done);
+      move_to(body, now.next, done.drift, state.displacement, state.velocity);
     } else {
-      body.momentum += impulse;
-      body.spin += turning;
-      move_to(body, drifted(body, done.drift), done.drift, state.displacement, state.velocity);
+      body.momentum = now.momentum;
+      body.spin = now.spin;
+      move_to(body, joints_ ? now.next : drifted(body, body.momentum, body.spin, done.drift), done.drift,
+              state.displacement, state.velocity);
     }
     for (std::uint32_t e = body.begin; e < body.end; ++e) {
       Vec3& support = moving.support[e - body.begin];

@@ -3,6 +3,7 @@
 // what [contact] lets them.
 #pragma once
 #include "simulate/effects/effect.h"
+#include "simulate/rigid/joints.h"
 #include "simulate/rigid/live_tool.h"
 #include "simulate/rigid/path.h"
 #include "simulate/rigid/rigid_body.h"
@@ -33,6 +34,13 @@ class RigidParts : public Effect {
 
   [[nodiscard]] static std::optional<RigidParts> make(const Parameters& parameters, const Problem& problem);
   [[nodiscard]] std::string why() const override;
+
+  // Of those that move, by number: that of a part of the body, if it is one; its state; whether a path leads it.
+  [[nodiscard]] std::optional<std::size_t> number_of(std::uint32_t part) const;
+  [[nodiscard]] const RigidBody& body(std::size_t number) const { return moving_[number].body; }
+  [[nodiscard]] bool is_led(std::size_t number) const { return moving_[number].led.has_value(); }
+  // From now on these joints hold; the states of all, which stay where they are.
+  [[nodiscard]] std::vector<const RigidBody*> join(std::shared_ptr<JointSystem> joints);
 
   [[nodiscard]] bool finishes_steps() const override { return true; }
   [[nodiscard]] bool needs_mass() const override { return true; }
@@ -73,7 +81,10 @@ class RigidParts : public Effect {
     void feel(const Pose& next, const Mat3& rotation, const Vec3& impulse, const Vec3& turning,
               const StepDone& done);
   };
+  [[nodiscard]] std::vector<JointedBody> as_jointed() const;
+
   std::vector<Moving> moving_;
+  std::shared_ptr<JointSystem> joints_;  // null: there are none
   const Body* body_ = nullptr;
   std::vector<double> mass_;  // (elements) kg
 };

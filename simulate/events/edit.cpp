@@ -56,11 +56,19 @@ void take_unmarked(Columns& columns, const std::string& name, std::vector<std::u
   }
 }
 
+constexpr const char* kEditedColumns = "edited_";  // and the line of the event in the scene
+
+bool is_edited_column(const std::string& name) {
+  const std::string_view prefix = kEditedColumns;
+  return name.size() > prefix.size() && name.starts_with(prefix) &&
+         name.find_first_not_of("0123456789", prefix.size()) == std::string::npos;
+}
+
 // What an event that happens again and again has edited, by a column that is there between its first and its last time.
 class EditedAlready {
  public:
   EditedAlready(EventContext& context, const std::string& origin)
-      : context_(context), column_("edited_" + origin.substr(origin.rfind(':') + 1)) {
+      : context_(context), column_(kEditedColumns + origin.substr(origin.rfind(':') + 1)) {
     if (context_.turn == 0) forget();
   }
   EditedAlready(const EditedAlready&) = delete;
@@ -105,6 +113,11 @@ Column& connection_column(Body& body, const char* name) {
 }
 
 }  // namespace
+
+void forget_edits(Body& body) {
+  for (Columns* columns : {&body.cell_columns, &body.element_columns})
+    std::erase_if(*columns, [](const auto& column) { return is_edited_column(column.first); });
+}
 
 bool Edit::changes_elements_only() const {
   return density_ != 1 || yield_ != 1 || radius_ != 1 || stick_ != 0;

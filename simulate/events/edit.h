@@ -8,6 +8,9 @@
 
 namespace flexel::simulate {
 
+// Takes away what repeated edits remember between their turns, columns "edited_N", where a run ends before the last.
+void forget_edits(Body& body);
+
 class Edit {
  public:
   static constexpr const char* name = "edit";

@@ -7,14 +7,12 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <set>
 #include <unordered_map>
 
 #include "base/error.h"
 #include "base/units.h"
 #include "simulate/models/cells.h"
-#include "simulate/models/central_spring.h"
 #include "simulate/models/rest_shape.h"
 #include "simulate/models/set_rest_shape.h"
 
@@ -283,80 +281,6 @@ std::string Fuse::apply(EventContext& context) const {
                     "element to element), and no broken cell is nearly whole",
                     describe(region_), human_length(within_)));
   return fmt::format("{} points of parts fused, {} broken cells whole again", points, cells);
-}
-
-std::string FusedPoints::why() const {
-  return fmt::format("{} points fused by events", points_.size());
-}
-
-Vec3 FusedPoints::gap(const FusedPoint& point, const State& state) const {
-  // The weights' sum is 0: from one of the elements, so that rounding is that of the distances between them.
-  Vec3 rest = Vec3::Zero(), moved = Vec3::Zero();
-  for (std::size_t i = 1; i < point.elements.size(); ++i) {
-    const std::uint32_t own = point.elements[i], first = point.elements[0];
-    rest += point.weights[i] * (body_->rest[own] - body_->rest[first]);
-    moved += point.weights[i] * (state.displacement[own] - state.displacement[first]);
-  }
-  return rest + moved;
-}
-
-double FusedPoints::energy(const State& state) {
-  double energy = 0;
-  for (const FusedPoint& point : points_) {
-    const double off = gap(point, state).norm() - point.length;
-    energy += 0.5 * point.stiffness * off * off;
-  }
-  return energy;
-}
-
-void FusedPoints::add_forces(const State& state, std::vector<Vec3>& forces) {
-  for (const FusedPoint& point : points_) {
-    const Vec3 apart = gap(point, state);
-    Vec3 pull = -point.stiffness * apart;
-    if (point.length > 0) pull *= 1 - point.length / apart.norm();
-    for (std::size_t i = 0; i < point.elements.size(); ++i)
-      forces[point.elements[i]] += point.weights[i] * pull;
-  }
-}
-
-void FusedPoints::add_stiffness(const State& state, BlockMatrix& matrix) {
-  for (const FusedPoint& point : points_) {
-    Block block = point.stiffness * Block::Identity();
-    if (point.length > 0) {
-      const Vec3 apart = gap(point, state);
-      const double length = apart.norm();
-      block = spring_tangent(point.stiffness, {apart / length, length, length - point.length}, true);
-    }
-    for (std::size_t i = 0; i < point.elements.size(); ++i)
-      for (std::size_t j = 0; j < point.elements.size(); ++j)
-        matrix.values[position_of(matrix, point.elements[i], point.elements[j])] +=
-            point.weights[i] * point.weights[j] * block;
-  }
-}
-
-std::vector<CoupledElements> FusedPoints::couples() const {
-  std::vector<CoupledElements> groups;
-  for (const FusedPoint& point : points_) {
-    groups.push_back(point.elements);
-    std::sort(groups.back().begin(), groups.back().end());
-  }
-  return groups;
-}
-
-// Gershgorin on the rows of k w w^T.
-double FusedPoints::added_frequency(const State&, const std::vector<double>& mass) {
-  if (added_frequency_) return *added_frequency_;
-  std::map<std::uint32_t, double> row;
-  for (const FusedPoint& point : points_) {
-    double all = 0;
-    for (const double weight : point.weights) all += std::abs(weight);
-    for (std::size_t i = 0; i < point.elements.size(); ++i)
-      row[point.elements[i]] += point.stiffness * std::abs(point.weights[i]) * all;
-  }
-  double largest = 0;
-  for (const auto& [e, sum] : row) largest = std::max(largest, sum / mass[e]);
-  added_frequency_ = largest;
-  return largest;
 }
 
 }  // namespace flexel::simulate

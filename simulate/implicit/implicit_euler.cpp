@@ -332,11 +332,17 @@ std::vector<Vec3> ImplicitEuler::damping_force() const {
 double ImplicitEuler::numerical_dissipation(const State& state) {
   std::vector<Vec3> forces(mass_.size(), Vec3::Zero());
   mechanics_->add_elastic_forces(state, forces);
+  double lost = mechanics_->elastic_energy(before_) - mechanics_->elastic_energy(state);
+  for (const ActiveEffect& effect : effects_) {
+    if (effect->account() != EnergyAccount::potential) continue;
+    effect->add_forces(state, forces);
+    lost += effect->energy(before_) - effect->energy(state);
+  }
   const double moved = parallel_sum<double>(mass_.size(), [&](std::size_t e) {
     return 0.5 * mass_[e] * (state.velocity[e] - before_.velocity[e]).squaredNorm() -
            forces[e].dot(moved_[e]);
   });
-  return moved + mechanics_->elastic_energy(before_) - mechanics_->elastic_energy(state);
+  return moved + lost;
 }
 
 void ImplicitEuler::add_forces(std::size_t effect, const State& state, std::vector<Vec3>& forces) const {

@@ -56,8 +56,8 @@ class ImplicitEuler {
   [[nodiscard]] const std::vector<Vec3>& supports() const { return supports_; }
   // As another run's last advance left them.
   void set_supports(std::vector<Vec3> supports) { supports_ = std::move(supports); }
-  // J, what the method itself took: 1/2 |v - v-|^2_M, and what the elastic energy fell short of its work
-  // E- - E + grad E(u) . (u - u-). `state`: after the advance.
+  // J, what the method itself took: 1/2 |v - v-|^2_M, and what the energy E, elastic and potential, fell short of its
+  // work, E- - E + grad E(u) . (u - u-). `state`: after the advance.
   [[nodiscard]] double numerical_dissipation(const State& state);
   // Adds the forces of effect p of the constructor's [N] as the advance took them. `state`: after it.
   void add_forces(std::size_t effect, const State& state, std::vector<Vec3>& forces) const;

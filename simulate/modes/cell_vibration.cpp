@@ -12,7 +12,7 @@
 #include "simulate/equilibrium/equilibrium_problem.h"
 #include "simulate/equilibrium/newton.h"
 #include "simulate/estimate/coarsen.h"
-#include "simulate/events/fuse.h"
+#include "simulate/events/fused.h"
 #include "simulate/linear/free_motions.h"
 #include "simulate/linear/multigrid.h"
 #include "simulate/linear/vector_products.h"

@@ -28,12 +28,9 @@ void ConnectionFriction::parse(TableReader& scene, Parameters& parameters) {
   }
 }
 
-std::optional<ConnectionFriction> ConnectionFriction::make(const Parameters& parameters,
-                                                           const Problem& problem) {
-  if (parameters.entries.empty()) return std::nullopt;
-  ConnectionFriction made;
-  made.entries_ = parameters.entries.size();
-  made.coefficient_.assign(problem.body.parts.size(), 0);
+std::vector<double> ConnectionFriction::coefficients(const Parameters& parameters, const Problem& problem) {
+  std::vector<double> coefficient(problem.body.parts.size(), 0);
+  if (parameters.entries.empty()) return coefficient;
   bool any = false;
   for (const auto& [each, parts] : entries_of_parts(parameters.entries, problem.body))
     for (const std::uint32_t p : parts) {
@@ -44,12 +41,21 @@ std::optional<ConnectionFriction> ConnectionFriction::make(const Parameters& par
                                                    "connections of model \"paper\"",
                                                    *entry.part));
       if (!has_connections) continue;
-      made.coefficient_[p] = entry.coefficient;
+      coefficient[p] = entry.coefficient;
       any = true;
     }
   if (!any)
     throw InputError(parameters.entries[0].origin,
                      "no part can have internal friction: it acts along the connections of model \"paper\"");
+  return coefficient;
+}
+
+std::optional<ConnectionFriction> ConnectionFriction::make(const Parameters& parameters,
+                                                           const Problem& problem) {
+  if (parameters.entries.empty()) return std::nullopt;
+  ConnectionFriction made;
+  made.entries_ = parameters.entries.size();
+  made.coefficient_ = coefficients(parameters, problem);
   if (*std::max_element(made.coefficient_.begin(), made.coefficient_.end()) == 0) return std::nullopt;
   made.mass_ = lumped_masses(problem);
   made.body_ = &problem.body;

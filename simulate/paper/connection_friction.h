@@ -26,6 +26,8 @@ class ConnectionFriction : public Effect {
   static constexpr const char* name = "internal friction";
 
   static void parse(TableReader& scene, Parameters& parameters);
+  // (parts) mu; 0 in parts of other models. Throws InputError as make() does.
+  [[nodiscard]] static std::vector<double> coefficients(const Parameters& parameters, const Problem& problem);
   // Throws InputError: an unknown part, a part of another model, no part of model `paper`.
   [[nodiscard]] static std::optional<ConnectionFriction> make(const Parameters& parameters,
                                                               const Problem& problem);

@@ -164,11 +164,13 @@ void measure_stress(const Problem& problem, const State& state, Body& body, Simu
 
 namespace {
 
-// (parts) Pa; 0: none, or edits changed it.
+// (parts) Pa; 0: none, or edits changed it, or model `paper`, which has no stresses.
 std::vector<double> yields_of_parts(const Body& body, const std::vector<Material>& materials) {
   std::vector<double> yields;
   for (std::size_t p = 0; p < body.parts.size(); ++p)
-    yields.push_back(has_edited_limits(body, body.parts[p]) ? 0 : materials[p].yield);
+    yields.push_back(body.parts[p].placement == Placement::centre || has_edited_limits(body, body.parts[p])
+                         ? 0
+                         : materials[p].yield);
   return yields;
 }
 

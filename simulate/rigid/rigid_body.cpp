@@ -20,17 +20,13 @@ constexpr double kRounding = 1e-16;   // share of the angular momentum
 constexpr int kMostRounds = 60;
 constexpr double kMostPieces = 1e4;  // of a step, of that turn
 
-Vec3 angular_velocity(const RigidBody& rigid, const Mat3& rotation) {
-  return rotation * rigid.inverse_inertia * rotation.transpose() * rigid.spin;
-}
-
 Mat3 inertia_of(const Mat3& second) {
   return second.trace() * Mat3::Identity() - second;
 }
 
 // dt w of the header [rad], in the frame of the part. The iteration contracts by half the turn.
-Vec3 turn_in(const RigidBody& rigid, const Mat3& rotation, double step) {
-  const Vec3 spin = rotation.transpose() * rigid.spin;
+Vec3 turn_in(const RigidBody& rigid, const Mat3& rotation, const Vec3& momentum, double step) {
+  const Vec3 spin = rotation.transpose() * momentum;
   Vec3 middle = spin, velocity = rigid.inverse_inertia * spin;
   for (int i = 0; i < kMostRounds; ++i) {
     const double half = 0.5 * step * velocity.norm();
@@ -108,9 +104,13 @@ void take_up(RigidBody& rigid, const Body& body, const std::vector<double>& mass
   rigid.spin = rotation * rigid.inertia * rotation.transpose() * turning;
 }
 
-Pose drifted(const RigidBody& rigid, double step) {
-  Pose next{rigid.pose.translation + step / rigid.mass * rigid.momentum, rigid.pose.rotation};
-  const double fastest = rigid.inverse_inertia.norm() * rigid.spin.norm();  // rad/s
+Vec3 angular_velocity(const RigidBody& rigid, const Mat3& rotation, const Vec3& spin) {
+  return rotation * rigid.inverse_inertia * rotation.transpose() * spin;
+}
+
+Pose drifted(const RigidBody& rigid, const Vec3& momentum, const Vec3& spin, double step) {
+  Pose next{rigid.pose.translation + step / rigid.mass * momentum, rigid.pose.rotation};
+  const double fastest = rigid.inverse_inertia.norm() * spin.norm();  // rad/s
   const double pieces = std::ceil(std::max(step * fastest / kLargestTurn, 1.0));
   if (!(pieces <= kMostPieces))
     throw DivergedError(fmt::format(
@@ -118,7 +118,7 @@ Pose drifted(const RigidBody& rigid, double step) {
         "or a slower spin",
         fastest, step * fastest / (2 * std::numbers::pi), step));
   for (double piece = 0; piece < pieces; ++piece)
-    next.rotation = next.rotation * turned_by(turn_in(rigid, next.rotation, step / pieces));
+    next.rotation = next.rotation * turned_by(turn_in(rigid, next.rotation, spin, step / pieces));
   return next;
 }
 
@@ -128,7 +128,7 @@ RigidMomenta momenta_at(const RigidBody& rigid, const Pose& at, const Vec3& mome
   const Vec3 centre = rigid.centre + at.translation;
   return {rigid.begin, rigid.end,
           0.5 * (momentum_before.dot(rigid.momentum) / rigid.mass +
-                 spin_before.dot(angular_velocity(rigid, at.rotation))),
+                 spin_before.dot(angular_velocity(rigid, at.rotation, rigid.spin))),
           momentum, centre.cross(momentum) + 0.5 * (spin_before + rigid.spin)};
 }
 
@@ -136,7 +136,7 @@ void move_to(RigidBody& rigid, const Pose& next, double step, std::vector<Vec3>&
              std::vector<Vec3>& velocity) {
   const Vec3 moved = next.translation - rigid.pose.translation;
   const Mat3 change = next.rotation - rigid.pose.rotation;
-  const Vec3 spin = angular_velocity(rigid, next.rotation);
+  const Vec3 spin = angular_velocity(rigid, next.rotation, rigid.spin);
   const Mat3 turned = next.rotation - Mat3::Identity();
   for (std::uint32_t e = rigid.begin; e < rigid.end; ++e) {
     const Vec3& arm = rigid.arms[e - rigid.begin];

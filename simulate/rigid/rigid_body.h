@@ -60,8 +60,10 @@ struct RigidBody {
 void take_up(RigidBody& rigid, const Body& body, const std::vector<double>& mass,
              const std::vector<Vec3>& displacement, const std::vector<Vec3>& velocity);
 
-// The pose after `step` s with the present momenta.
-[[nodiscard]] Pose drifted(const RigidBody& rigid, double step);
+// rad/s, of that angular momentum where it is turned so.
+[[nodiscard]] Vec3 angular_velocity(const RigidBody& rigid, const Mat3& rotation, const Vec3& spin);
+// The pose after `step` s with these momenta.
+[[nodiscard]] Pose drifted(const RigidBody& rigid, const Vec3& momentum, const Vec3& spin, double step);
 // Between the momenta that led to the pose `at` and the present ones.
 [[nodiscard]] RigidMomenta momenta_at(const RigidBody& rigid, const Pose& at, const Vec3& momentum_before,
                                       const Vec3& spin_before);

@@ -15,6 +15,7 @@
 #include "simulate/effects/plasticity.h"
 #include "simulate/effects/rigid.h"
 #include "simulate/effects/supports.h"
+#include "simulate/joints/joints.h"
 #include "simulate/paper/connection_friction.h"
 #include "simulate/thermal/thermal.h"
 
@@ -45,6 +46,21 @@ void make_one<Contact>(const EffectParameters& parameters, const Problem& proble
   if (losses) to.push_back(activate(std::move(*losses)));
 }
 
+template <class E>
+E* made_before(const std::vector<ActiveEffect>& effects) {
+  for (const ActiveEffect& effect : effects)
+    if (E* found = dynamic_cast<E*>(&effect.untimed())) return found;
+  return nullptr;
+}
+
+template <>
+void make_one<Joints>(const EffectParameters& parameters, const Problem& problem,
+                      std::vector<ActiveEffect>& to) {
+  if (auto made = Joints::make(parameters.get<Joints>(), problem, made_before<RigidParts>(to),
+                               made_before<Bonds>(to)))
+    to.push_back(activate(std::move(*made)));
+}
+
 // `can_leave_out`: see EffectRow.
 template <class E>
 EffectRow row(const char* help, ActsIn acts, const char* models, std::vector<std::string> can_leave_out,
@@ -58,8 +74,10 @@ std::vector<SceneKey> gravity_keys() {
           {"[gravity]", "mutual", K::flag, {}, "false", "every element attracts every other; in timed runs"},
           {"[gravity]", "constant", K::quantity, D::gravitational_constant, "6.6743e-11 m3/kg/s2",
            "G of source and mutual"},
-          {"source of [gravity]", "at", K::vector, D::length, "required", "where it is; it does not move"},
-          {"source of [gravity]", "mass", K::quantity, D::mass, "required", "its mass"}};
+          {"source of [gravity]", "at", K::vector, D::length, "required; or part",
+           "where it is; it does not move"},
+          {"source of [gravity]", "part", K::text, {}, "", "a part, which moves: its centre of mass draws"},
+          {"source of [gravity]", "mass", K::quantity, D::mass, "required; the part's", "its mass"}};
 }
 
 std::vector<SceneKey> load_keys() {
@@ -156,6 +174,19 @@ std::vector<SceneKey> rigid_keys() {
       {t, "rotation", K::list, {}, "", "{ axis, angle } at each time"}};
 }
 
+std::vector<SceneKey> joint_keys() {
+  const std::string t = "[[joint]]";
+  return {
+      {t, "kind", K::text, {}, "required", "\"hinge\", \"slider\", \"ball\" or \"motor\""},
+      {t, "parts", K::list, {}, "required", "a rigid part, and another or the world"},
+      {t, "at", K::vector, D::length, "required", "a point of both at rest"},
+      {t, "axis", K::direction, {}, "required; not of balls", "that it turns about or slides along"},
+      {t, "name", K::text, {}, "the parts'", "for the history"},
+      {t, "angle_per_second", K::quantity, D::angle, "", "of a motor: of the first part against the other"},
+      {t, "torque", K::quantity, D::torque, "",
+       "of a motor: its couple, or the most it takes for its speed"}};
+}
+
 std::vector<SceneKey> thermal_keys() {
   const std::string t = "[thermal]", s = "[shrinkage]", m = "[materials.NAME]";
   const std::string fixed = "[[temperature]]", heat = "[[heat]]", air = "[[convection]]";
@@ -238,6 +269,8 @@ const std::vector<EffectRow>& effect_rows() {
       row<Drag>("a medium that resists what moves", kNotAtRest, kAll, {"drag"}, drag_keys()),
       row<RigidParts>("rigid parts and manipulators", kWithContact,
                       "cells, springs, paper; quadratic at equilibrium", {}, rigid_keys()),
+      row<Joints>("hinges, sliders, ball joints and motors of rigid parts", kNotAtRest, kAll, {"joint"},
+                  joint_keys()),
       row<Contact>("parts push each other, slide and stick", kWithContact, kAll, {"contact"}, contact_keys()),
   };
   return rows;

@@ -1,6 +1,8 @@
 // Materials whose strength is not known are named, so that nobody takes silence for safety.
 #include "simulate/scene/strength.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "base/error.h"
@@ -40,6 +42,10 @@ std::optional<StrengthSummary> nearest_to_strength(const Body& body, const std::
     const Part& part = body.parts[p];
     const Material& material = materials[p];
     if (part.element_begin == part.element_end) continue;
+    if (part.placement == Placement::centre) {
+      unknown.push_back(fmt::format("part \"{}\" of model \"paper\"", part.name));
+      continue;
+    }
     const double limit = material.yield > 0 ? material.yield : material.strength;
     // along and across the grain strengths differ many times over: one number says nothing of the nearest
     if (!(limit > 0) || material.law == LawName::orthotropic || has_edited_limits(body, part)) {

@@ -27,7 +27,7 @@ namespace flexel::simulate {
 namespace {
 
 constexpr char kMagic[8] = {'f', 'l', 'e', 'x', 'e', 'l', 'C', 'P'};
-constexpr std::uint64_t kVersion = 7;
+constexpr std::uint64_t kVersion = 8;
 
 struct Head {
   char magic[8];
@@ -61,7 +61,7 @@ static void visit(Archive& archive, Checkpoint& c) {
             c.bonding_parts, c.memory.effects, c.ledger.accounts, c.ledger.rows, c.ledger.probes,
             c.ledger.columns, c.ledger.start, c.ledger.changed, c.ledger.worst_residual, c.ledger.unstored,
             c.ledger.unstored_now, c.ledger.worst_unstored, c.ledger.largest_term, c.next_row, c.next_frame,
-            c.frames);
+            c.frames.times, c.frames.surface_frame, c.frames.surface_parts);
 }
 
 void write_checkpoint(const Checkpoint& checkpoint, const Bytes& body, const std::string& path) {

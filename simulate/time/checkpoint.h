@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "simulate/time/series.h"
 #include "simulate/time/time_segment.h"
 
 namespace flexel::simulate {
@@ -26,7 +27,7 @@ struct Checkpoint {
   std::uint64_t bonding_parts = 0;  // and this
   Ledger ledger;
   double next_row = 0, next_frame = 0;  // s
-  std::vector<double> frames;           // s, of the series so far
+  SeriesPlace frames;                   // of the series so far
 };
 
 // `body`: the bytes of its file. Appears under `path` only when it is whole. Throws InputError: it cannot be

@@ -152,7 +152,10 @@ void EnergyHistory::after(const State& state, const StepOutcome& outcome, const 
   if (half_kick)
     parallel_for_each(velocity_.size(),
                       [&](std::size_t e) { velocity_[e] = 2 * velocity_[e] - state.velocity[e]; });
-  const auto add_powers = [&](const std::vector<Vec3>& velocity, double time) {
+  const auto add_powers = [&](const std::vector<Vec3>& velocity, double time, bool behind) {
+    for (const ActiveEffect& effect : effects_)
+      for (const EffectPower& each : effect->powers(behind))
+        ledger_.accounts[ledger_.account(each.account, kind_of(each.kind))].energy += time * each.power;
     const auto enter = [&](std::size_t account, const std::vector<Vec3>& forces) {
       ledger_.accounts[account].energy += time * parallel_sum<double>(forces.size(), [&](std::size_t e) {
                                             return forces[e].dot(velocity[e]);
@@ -165,7 +168,7 @@ void EnergyHistory::after(const State& state, const StepOutcome& outcome, const 
     enter(damping_, connection_damping_);
   };
   // before an event the half step to it was entered
-  if (!ledger_.changed) add_powers(velocity_, 0.5 * previous_step);
+  if (!ledger_.changed) add_powers(velocity_, 0.5 * previous_step, false);
   const std::vector<Account> kept = closing_ ? ledger_.accounts : std::vector<Account>();
   if (plasticity_) ledger_.accounts[*plasticity_].energy -= outcome.plastic_work;
   if (fracture_) ledger_.accounts[*fracture_].energy -= outcome.released;
@@ -174,7 +177,7 @@ void EnergyHistory::after(const State& state, const StepOutcome& outcome, const 
   if (closing_)
     ledger_.accounts = kept;
   else
-    add_powers(state.velocity, 0.5 * step);
+    add_powers(state.velocity, 0.5 * step, true);
 }
 
 void EnergyHistory::add_row_of(const State& state, const std::vector<Vec3>& supports) {

@@ -21,21 +21,28 @@ void Series::enter(double time) {
   for (const char c : name_)
     file += c == '&' ? "&amp;" : c == '<' ? "&lt;" : c == '"' ? "&quot;" : std::string(1, c);
   entries_ += fmt::format("    <DataSet timestep=\"{:.17g}\" part=\"0\" file=\"{}_{:05}.vtu\"/>\n", time,
-                          file, times_.size());
-  times_.push_back(time);
+                          file, place_.times.size());
+  place_.times.push_back(time);
 }
 
-void Series::resume(const std::vector<double>& times) {
-  for (const double time : times) enter(time);
-  parts_ = SIZE_MAX;
+void Series::resume(const SeriesPlace& place) {
+  for (const double time : place.times) enter(time);
+  place_ = place;
 }
 
 void Series::add(const Body& body, double time) {
   BodyFileOptions options;
   options.compress = compress_;
-  options.embed_surface = times_.empty() || body.parts.size() > parts_;  // parts may join
-  parts_ = body.parts.size();
-  write_body(body, fmt::format("{}_{:05}.vtu", base_, times_.size()), options);
+  const std::size_t frame = place_.times.size();
+  if (frame == 0 || body.parts.size() != place_.surface_parts) {  // parts may join
+    place_.surface_frame = frame;
+    place_.surface_parts = body.parts.size();
+    surface_hash_.reset();
+  } else if (body.surface.polygon_count() > 0) {
+    if (!surface_hash_) surface_hash_ = surface_hash(body.surface);
+    options.surface_beside = {fmt::format("{}_{:05}.vtu", name_, place_.surface_frame), *surface_hash_};
+  }
+  write_body(body, fmt::format("{}_{:05}.vtu", base_, frame), options);
   enter(time);
   OutputFile out(path_, false);
   out.write(

@@ -10,9 +10,11 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/stop.h"
-#include "simulate/events/fuse.h"
+#include "simulate/matter/masses.h"
 #include "simulate/models/rest_shape.h"
+#include "simulate/paper/connection_friction.h"
 #include "simulate/probes/report.h"
+#include "simulate/scene/coming_parts.h"
 #include "simulate/stepping/failure_messages.h"
 
 namespace flexel::simulate {
@@ -67,13 +69,14 @@ TimeSegment::TimeSegment(Body& body, const Scene& scene, const SimulateOptions& 
       problem_(timed_problem(body, scene, beginning)),
       fused_(beginning.fused),
       probes_(place_probes(scene, problem_)),
-      effects_(active_effects(scene.effects, problem_)),
+      effects_(active_effects(scene.coming_parts.empty() ? scene.effects : without_coming_parts(scene, body),
+                              problem_)),
       state_(std::move(state)) {
   const bool fresh = beginning.fresh;
-  if (!fused_.empty()) effects_.push_back(activate(FusedPoints(body, fused_)));
   if (fresh) report_materials(problem_, progress_);
   name_materials(body_, problem_.materials);
   configure_kernel();
+  add_fused();
   begin_effects(beginning);
   refuse_held_rigid();
   bound_.emplace(problem_, effects_, plan_);
@@ -100,6 +103,16 @@ void TimeSegment::configure_kernel() {
   plan_.broken_springs = body_.cell_columns.contains("broken_springs");
   for (const ActiveEffect& effect : effects_) effect->configure_kernel(plan_);
   for (const ActiveEffect& effect : effects_) effect->check_kernel(plan_);
+}
+
+void TimeSegment::add_fused() {
+  if (fused_.empty()) return;
+  const auto shared = std::make_shared<FusedConnections>(fused_connections(
+      body_, fused_, plan_, ConnectionFriction::coefficients(scene_.get<ConnectionFriction>(), problem_)));
+  effects_.push_back(activate(FusedPoints(body_, shared)));
+  joined_ = static_cast<FusedPoints*>(&effects_.back().untimed());
+  if (std::optional<FusedLosses> losses = FusedLosses::make(body_, shared, lumped_masses(problem_)))
+    effects_.push_back(activate(std::move(*losses)));
 }
 
 void TimeSegment::begin_effects(const SegmentStart& beginning) {
@@ -196,6 +209,8 @@ void TimeSegment::choose_step(Clock& clock) {
                                    *scene_.run.step, longest));
     step = std::min(clock.steps == 0 ? longest : step, *scene_.run.step);
   }
+  for (const ActiveEffect& effect : effects_)
+    if (!euler_ && !scene_.run.step) step = std::min(step, effect->first_step());
   clock.damping_rate = bound_->damping_rate();
   clock.epoch = *state_.time;
   clock.in_epoch = 0;
@@ -370,9 +385,13 @@ bool TimeSegment::fits_connections(const ConnectionMemory& memory) const {
 }
 
 ConnectionLosses TimeSegment::yield_connections() {
-  if (!yield_) return {};
-  const ScopeTimer timer(paper_seconds_);
-  return yield_->advance(state_);
+  ConnectionLosses losses;
+  if (yield_) {
+    const ScopeTimer timer(paper_seconds_);
+    losses = yield_->advance(state_);
+  }
+  if (joined_) losses += joined_->tear(state_);
+  return losses;
 }
 
 void TimeSegment::step(Clock& clock, EnergyHistory* history, bool row) {
@@ -431,6 +450,7 @@ void TimeSegment::kick(double time) {
   const StopWaits whole;  // half a kick is no state
   const Stepper::Memory memory = stepper_->memory();
   const ConnectionMemory connections = yield_ ? paper_->memory() : ConnectionMemory{};
+  const std::vector<double> joined = joined_ ? joined_->memory() : std::vector<double>();
   const std::vector<Vec3> before = state_.velocity;
   state_.kick = std::abs(time);
   (void)yield_connections();
@@ -438,6 +458,7 @@ void TimeSegment::kick(double time) {
   held_->copy(before, state_.velocity);
   stepper_->restore(memory);
   if (yield_) paper_->memory() = connections;
+  if (joined_) joined_->restore(joined);
 }
 
 void TimeSegment::close_books(const Clock& clock, EnergyHistory& history) {

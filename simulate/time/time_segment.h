@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "simulate/events/event.h"
+#include "simulate/events/fused.h"
 #include "simulate/implicit/implicit_euler.h"
 #include "simulate/paper/connection_yield.h"
 #include "simulate/result/options.h"
@@ -118,11 +119,14 @@ class TimeSegment {
   [[nodiscard]] const Stepper& stepper() const { return *stepper_; }
   [[nodiscard]] bool damps() const;  // internally
   [[nodiscard]] bool is_implicit() const { return euler_.has_value(); }
+  // What was fused before it and has not broken.
+  [[nodiscard]] std::vector<FusedPoint> fused() const { return joined_ ? joined_->left() : fused_; }
   [[nodiscard]] std::unique_ptr<EnergyHistory> make_history(Ledger ledger) const;
 
  private:
   class ModelTimer;
   void configure_kernel();
+  void add_fused();
   void begin_effects(const SegmentStart& beginning);
   void store_stuck();
   [[nodiscard]] double effect_seconds() const;
@@ -150,6 +154,7 @@ class TimeSegment {
   std::vector<FusedPoint> fused_;
   std::vector<ProbePoints> probes_;
   std::vector<ActiveEffect> effects_;
+  FusedPoints* joined_ = nullptr;  // in effects_; null: nothing is fused
   KernelEffects plan_;
   Constraints constraints_;
   State state_;

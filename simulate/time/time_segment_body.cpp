@@ -41,7 +41,7 @@ void TimeSegment::store(const State& state) {
   if (stepper_->mark_broken(body_.broken)) derive_connections(body_);
   stepper_->write_memory(body_.cell_count(), body_.cell_columns);
   if (yield_) yield_->write(body_);
-  set_fused_points(body_, fused_);
+  set_fused_points(body_, fused());
   store_stuck();
 }
 

@@ -18,6 +18,7 @@
 #include "formats/lattice/fused_points.h"
 #include "simulate/contact/pairs/stuck_places.h"
 #include "simulate/effects/contact.h"
+#include "simulate/events/edit.h"
 #include "simulate/events/repeated_events.h"
 #include "simulate/live/live_link.h"
 #include "simulate/models/damping_factors.h"
@@ -166,7 +167,7 @@ void TimedRun::resume(const Checkpoint& from) {
   if (series_) series_->resume(from.frames);
   next_row_ = from.next_row;
   next_frame_ = from.next_frame;
-  frames_ = from.frames.size();
+  frames_ = from.frames.times.size();
 }
 
 // Within an implicit step: what was reached before it stays.
@@ -187,7 +188,7 @@ void TimedRun::keep() {
   kept_->fused = start_.fused;
   kept_->bonding_parts = start_.bonding_parts;
   if (history_) kept_->ledger = history_->ledger();
-  if (series_) kept_->frames = series_->times();
+  if (series_) kept_->frames = series_->place();
   kept_->next_row = next_row_;
   kept_->next_frame = next_frame_;
 }
@@ -278,6 +279,7 @@ std::string TimedRun::save(const std::optional<State>& state) {
     segment_->store(*state);
   else  // an event failed, and the body is what it was before that
     set_fused_points(body_, start_.fused);
+  forget_edits(body_);
   if (options_.failed_output.empty() || !attempt("state", [&] { write_body(body_, options_.failed_output); }))
     return "";
   return fmt::format("; the state at {:.6g} s is in {}", *state->time, options_.failed_output);
@@ -352,6 +354,7 @@ void TimedRun::apply(std::size_t end) {
   segment_->store(segment_->state());
   segment_->add_effort(result_, options_.explain);
   start_.transferred_states = segment_->transferred_states();
+  start_.fused = segment_->fused();
   State state = segment_->state();
   start_.fresh = false;
   segment_.reset();
@@ -402,6 +405,7 @@ void TimedRun::play() {
 // The body at the last state, the books written, and what is told of the run.
 SimulateResult TimedRun::ended() {
   segment_->store(segment_->state());
+  forget_edits(body_);
   if (history_) write_text(history_->ledger().csv(), options_.history);
   SimulateResult result = report();
   if (scene_.run.renormalise)

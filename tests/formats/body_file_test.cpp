@@ -1,5 +1,6 @@
 #include "formats/lattice/body_file.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -144,7 +145,7 @@ TEST_F(BodyFile, RoundTripKeepsEveryBit) {
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     for (const bool compress : {false, true}) {
       const Body body = test::random_body(seed);
-      write_body(body, path("body.vtu"), {compress, true});
+      write_body(body, path("body.vtu"), {compress});
       expect_same(body, read_body(path("body.vtu")));
     }
   }
@@ -152,26 +153,47 @@ TEST_F(BodyFile, RoundTripKeepsEveryBit) {
 
 TEST_F(BodyFile, WritingTwiceGivesTheSameBytes) {
   const Body body = test::random_body(3);
-  for (const bool compress : {false, true})
-    EXPECT_EQ(written(body, {compress, true}), written(body, {compress, true}));
+  for (const bool compress : {false, true}) EXPECT_EQ(written(body, {compress}), written(body, {compress}));
 }
 
 TEST_F(BodyFile, CompressedIsSmallerWhereThereIsSomethingToSqueeze) {
   Body body = test::random_body(1);
   body.element_columns["zero"] = {3, std::vector<double>(3 * body.element_count(), 0.0)};
-  EXPECT_LT(written(body, {true, true}).size(), written(body, {false, true}).size());
+  EXPECT_LT(written(body, {true}).size(), written(body, {false}).size());
 }
 
-TEST_F(BodyFile, AFrameOfASeriesLeavesTheSurfaceAndTheMomentsOut) {
+TEST_F(BodyFile, AFrameOfASeriesTakesTheSurfaceAndTheMomentsFromTheFirst) {
   const Body body = test::random_body(4);
-  write_body(body, path("frame.vtu"), {false, false});
+  write_body(body, path("first.vtu"));
+  write_body(body, path("frame.vtu"), {false, SurfaceBeside{"first.vtu", surface_hash(body.surface)}});
   Body bare = body;
   bare.surface = {};
   bare.surface_cells.clear();
   bare.surface_cell_offsets.clear();
   bare.moment_cells.clear();
   bare.moments.clear();
-  expect_same(bare, read_body(path("frame.vtu")));
+  expect_same(bare, read_frame(path("frame.vtu")));
+  expect_same(body, read_body(path("frame.vtu")));
+  const auto message = [&] {
+    try {
+      (void)read_body(path("frame.vtu"));
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  Body other = body;
+  other.surface.vertices[0].x() += 1;
+  write_body(other, path("first.vtu"));
+  EXPECT_THAT(message(), ::testing::HasSubstr("another one now"));
+  write_body(bare, path("first.vtu"));
+  EXPECT_NE(message(), "") << "a frame that has none itself";
+  std::filesystem::remove(path("first.vtu"));
+  EXPECT_THAT(message(), ::testing::HasSubstr("missing"));
+  for (const char* file : {"../first.vtu", "", ".."}) {
+    write_body(body, path("frame.vtu"), {false, SurfaceBeside{file, 1}});
+    EXPECT_THAT(message(), ::testing::HasSubstr("no name of a file")) << file;
+  }
 }
 
 TEST_F(BodyFile, HexahedraHaveVtksCornerOrder) {
@@ -197,7 +219,7 @@ TEST_F(BodyFile, EveryTruncationIsRefused) {
   for (const bool compress : {false, true}) {
     Body body = test::random_body(2);
     body.surface.sources[0].bytes.resize(1000);
-    const std::string text = written(body, {compress, true});
+    const std::string text = written(body, {compress});
     std::vector<std::size_t> lengths;
     for (std::size_t length = 1; length < text.size(); length += 1 + text.size() / 200)
       lengths.push_back(length);
@@ -228,7 +250,7 @@ TEST_F(BodyFile, RandomDamageNeverPassesUnchecked) {
   for (const bool compress : {false, true}) {
     Body body = test::random_body(5);
     body.surface.sources[0].bytes.resize(100);
-    const std::string good = written(body, {compress, true});
+    const std::string good = written(body, {compress});
     const std::size_t head = good.find("<AppendedData");
     int refused = 0;
     for (int trial = 0; trial < 600; ++trial) {

@@ -48,7 +48,7 @@ Bytes checkpoint_of(const Body& body) {
   c.ledger.accounts = {{"loads", simulate::Account::Kind::work, 1.5}};
   c.ledger.rows = {simulate::BookRow{}};
   c.ledger.probes = {"tip"};
-  c.frames = {0, 0.5};
+  c.frames = {{0, 0.5}, 1, 2};
   const std::string path =
       std::filesystem::temp_directory_path() / ("fuzz-checkpoint-" + std::to_string(getpid()));
   simulate::write_checkpoint(c, fuzz::file_of(body, false), path);

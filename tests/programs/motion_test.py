@@ -50,6 +50,24 @@ def test_series():
     expect(os.path.getsize(frames[0]) > os.path.getsize(frames[1]), "the first frame alone should hold the surface")
 
 
+def test_each_frame_of_a_series_is_mapped_by_itself():
+    body()
+    scene(text=SWING + "frames = 3\n")
+    expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "swing.pvd"))
+    os.remove("body.vtu")
+    expect_ok(run("flexel-map", "swing.pvd", "--keep-vertices", "-o", "all.stl"))
+    for frame in range(4):
+        expect_ok(run("flexel-map", f"swing_{frame:05}.vtu", "--keep-vertices", "-o", "one.stl", "--report", "one.json", "--force"))
+        expect(open("one.stl", "rb").read() == open(f"all_{frame:05}.stl", "rb").read(), f"frame {frame}")
+        expect(json.load(open("one.json"))["failures"]["inverted"] == 0, "it is checked")
+    expect_error(run("flexel-map", "-o", "piped.stl", stdin=open("swing_00002.vtu", "rb").read()), "flexel-map", "frame of a series by its name")
+    os.makedirs("elsewhere")
+    pathlib.Path("elsewhere/swing_00002.vtu").write_bytes(open("swing_00002.vtu", "rb").read())
+    expect_error(run("flexel-map", "elsewhere/swing_00002.vtu", "-o", "x.stl"), "flexel-map", "swing_00000.vtu", "missing")
+    expect_ok(run("flexel-voxelize", "one.stl", "--size", "1 mm", "-o", "elsewhere/swing_00000.vtu"))
+    expect_error(run("flexel-map", "elsewhere/swing_00002.vtu", "-o", "x.stl"), "flexel-map", "swing_00000.vtu", "same run")
+
+
 def test_series_is_read_by_meshio():
     try:
         import meshio

@@ -58,6 +58,10 @@ def test_every_command_of_the_page_prints_what_it_says():
     compare(page, 10)
 
 
+def test_the_figures():
+    compare(SOURCE / "docs/guide/paper-figures.md", 6)
+
+
 def test_bracket():
     compare_sample("bracket")
 

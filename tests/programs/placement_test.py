@@ -130,6 +130,19 @@ def test_models_that_do_not_fit():
                  'did you mean "paper"')
 
 
+def test_stresses_and_error_bars_are_refused_by_name():
+    centres(size="5 mm")
+    done = expect_ok(run("flexel-simulate", scene("bend.toml", SCENE.format("")), "centres.vtu", "-o", "bent.vtu", "--json"))
+    expect("strength   not known: model \"paper\" has no stresses" in done.err, done.err)
+    told = json.loads(done.out)
+    expect(told["error_bars"]["bars"] == [] and "voxels' centres" in told["error_bars"]["note"], told["error_bars"])
+    expect("stress" not in told and "strength" not in told, told)
+    for shown in (("picture", "-o", "x.png"), ("view", "--html", "x.html")):
+        expect_error(run("flexel", shown[0], "bent.vtu", "--color", "von_mises", *shown[1:]), "flexel", "von_mises", 'model "paper" has no stresses')
+    expect_error(run("flexel", "deform", "box.stl", "--fix", "xmin", "--push", "xmax: 1 N", "--material", "PLA", "--placement", "centre", "--accuracy", "5%",
+                     "-o", "x.stl"), "flexel", "--accuracy", "--placement centre")
+
+
 def test_a_wall_of_one_element_is_refused():
     box()
     expect_ok(run("flexel-voxelize", "box.stl", "--size", "8 mm", "--align", "none", "--placement", "centre", "-o", "thin.vtu"))

@@ -175,7 +175,7 @@ def test_series():
     scene("run.toml", SCENE + '[run]\ntime = "0.2 ms"\nframes = 4\n')
     expect_ok(run("flexel-simulate", "run.toml", "rest.vtu", "-o", "run.pvd"))
     expect_ok(run("flexel", "view", "run.pvd", "--html", "run.html"))
-    expect_ok(run("flexel", "view", "run_00001.vtu", "--html", "frame.html"))  # without a surface: its cells
+    expect_ok(run("flexel", "view", "run_00001.vtu", "--html", "frame.html"))  # by the surface of the first
     box()
     for shown, kind in (("run.pvd", "series"), ("box.stl", "part")):
         warned = expect_ok(run("flexel", "view", shown, "--cells", "--html", "cells.html", "--force")).err

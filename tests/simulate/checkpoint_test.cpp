@@ -56,7 +56,7 @@ Checkpoint some_checkpoint(const Body& body) {
   c.ledger.changed = true;
   c.next_row = 13;
   c.next_frame = 14;
-  c.frames = {0, 0.5};
+  c.frames = {{0, 0.5}, 1, 2};
   return c;
 }
 
@@ -92,7 +92,9 @@ TEST_F(CheckpointFile, ComesBackToTheBit) {
   EXPECT_EQ(found.ledger.accounts[1].name, "damping");
   EXPECT_EQ(found.fused[0].weights, wanted.fused[0].weights);
   EXPECT_TRUE(found.ledger.changed);
-  EXPECT_EQ(found.frames, wanted.frames);
+  EXPECT_EQ(found.frames.times, wanted.frames.times);
+  EXPECT_EQ(found.frames.surface_frame, wanted.frames.surface_frame);
+  EXPECT_EQ(found.frames.surface_parts, wanted.frames.surface_parts);
   EXPECT_EQ(body_fingerprint(resumed.body), found.input);
 }
 

@@ -8,9 +8,11 @@
 #include <cmath>
 
 #include "formats/lattice/body_file.h"
+#include "formats/lattice/merge.h"
 #include "simulate/effects/damping.h"
 #include "simulate/effects/fracture.h"
 #include "simulate/effects/plasticity.h"
+#include "simulate/events/fused.h"
 #include "simulate/matter/masses.h"
 #include "simulate/paper/connection_friction.h"
 #include "tests/sanitized.h"
@@ -241,6 +243,92 @@ TEST(ConnectionYield, FusedBlocksAreOneInLaterRunsToo) {
   (void)testing::simulate_quietly(later, yielding_scene(pull));
   EXPECT_GT(later.position[last].x() - later.rest[last].x(), 0);
   EXPECT_LT(later.position[last].x() - later.rest[last].x(), 0.1 * kWidth);
+}
+
+// Two elements of two parts, fused at 1.1 kWidth.
+Body two_parts() {
+  CentreOptions options = row_of({1, 1, 1});
+  options.name = "left";
+  Body body = centre_body(options);
+  options.name = "right";
+  options.origin = Vec3(1.1 * kWidth, 0, 0);
+  append(body, centre_body(options));
+  return body;
+}
+
+TEST(ConnectionYield, FusedConnectionsHaveTheMeansOfTheirElements) {
+  Body body = two_parts();
+  const double length = 1.1 * kWidth, stiffness = 50;
+  const std::vector<FusedPoint> points = {{{0, 1}, {1, -1}, stiffness, length}, {{0, 1}, {1, -1}, 3.0, 0.0}};
+  KernelEffects plan;
+  plan.damping = {1e-3, 3e-3};
+  plan.fracture = {{1e9, 0.1}, {1e9, 0.3}};
+  body.element_columns["strength_change"] = {1, {1, 0}};
+  body.element_columns["damping_change"] = {1, {0, 1}};
+  const auto fused = std::make_shared<FusedConnections>(fused_connections(body, points, plan, {0.2, 0.4}));
+  EXPECT_DOUBLE_EQ(fused->damping[0], 3.5e-3);
+  EXPECT_DOUBLE_EQ(fused->friction[0], 0.3);
+  EXPECT_DOUBLE_EQ(fused->elongation[0], 0.25);
+  EXPECT_EQ(fused->damping[1], 0) << "without a length it is no connection";
+  EXPECT_FALSE(std::isfinite(fused->elongation[1]));
+  FusedPoints held(body, fused);
+  const std::vector<double> mass = {1e-3, 1e-3};
+  std::optional<FusedLosses> losses = FusedLosses::make(body, fused, mass);
+  ASSERT_TRUE(losses.has_value());
+  // drawn apart by a tenth, at rates along and across it
+  const double apart = 0.1 * length;
+  State state{{Vec3::Zero(), Vec3(apart, 0, 0)}, 1, {Vec3::Zero(), Vec3(0.1, 0, 0.2)}, 0.0, 1e-9};
+  std::vector<Vec3> forces(2, Vec3::Zero());
+  losses->add_forces(state, forces);
+  const double damping = 3.5e-3 * stiffness * 0.1;
+  EXPECT_NEAR(forces[1].x(), -damping, 1e-12);
+  EXPECT_NEAR(forces[1].z(), -0.3 * (stiffness * apart + damping), 1e-12);
+  EXPECT_EQ(forces[0], Vec3(-forces[1]));
+  state.kick = 1e3;  // no step turns the motion round
+  forces.assign(2, Vec3::Zero());
+  losses->add_forces(state, forces);
+  const Vec3 after = state.velocity[1] - state.velocity[0] + state.kick / 1e-3 * (forces[1] - forces[0]);
+  EXPECT_NEAR(after.norm(), 0, 1e-9);
+  EXPECT_EQ(held.tear(state).broken, 0u);
+  state.displacement[1].x() = 0.26 * length;
+  state.kick = 0;
+  const ConnectionLosses torn = held.tear(state);
+  EXPECT_EQ(torn.broken, 1u);
+  EXPECT_NEAR(torn.released, 0.5 * stiffness * std::pow(0.26 * length, 2), 1e-12);
+  EXPECT_EQ(held.left().size(), 1u);
+  forces.assign(2, Vec3::Zero());
+  losses->add_forces(state, forces);
+  EXPECT_EQ(forces[1].norm(), 0);
+  FusedPoints again(body,
+                    std::make_shared<FusedConnections>(fused_connections(body, points, plan, {0.2, 0.4})));
+  again.restore(held.memory());
+  EXPECT_EQ(again.left().size(), 1u);
+}
+
+TEST(ConnectionYield, FusedBlocksTearAndLoseEnergy) {
+  CentreOptions options = row_of({3, 2, 2});
+  options.name = "left";
+  Body body = centre_body(options);
+  options.name = "right";
+  options.origin = Vec3(3 * kWidth, 0, 0);
+  append(body, centre_body(options));
+  std::vector<Vec3> velocity(body.element_count(), Vec3::Zero());
+  for (std::uint32_t e = body.parts[1].element_begin; e < body.element_count(); ++e) velocity[e].x() = 12;
+  set_velocity(body, velocity);
+  const std::string fuse = "[[event]]\nat = \"0 s\"\ndo = \"fuse\"\nwithin = \"11 mm\"\n";
+  const std::string damped = "[damping]\ntime = \"0.1 ms\"\n", run = "[run]\ntime = \"20 ms\"\n";
+  for (const char* method : {"", "method = \"implicit\"\nstep = \"20 us\"\n"}) {
+    const TimedCase whole = run_timed(body, yielding_scene(damped + run + method + fuse));
+    expect_books_close(whole.result);
+    EXPECT_EQ(fused_points(whole.body).size(), 4u);
+    EXPECT_GT(whole.history.column("fused damping dissipated").back(), 0);
+  }
+  const TimedCase torn =
+      run_timed(body, yielding_scene("[fracture]\nelongation = 0.05\n" + damped + run + fuse));
+  expect_books_close(torn.result);
+  expect_momenta_kept(torn.history, 1e-9);
+  EXPECT_TRUE(fused_points(torn.body).empty()) << "a later run begins in two pieces";
+  EXPECT_GT(torn.history.column("fracture dissipated").back(), 0);
 }
 
 TEST(ConnectionYield, RigidPartsHaveNoConnections) {

@@ -311,6 +311,45 @@ TEST(Events, BrokenCellsAreHealedWhereTheyAreWhole) {
   EXPECT_LT(stretch(event("0 s", "do = \"fuse\"\nwithin = \"1 mm\"")), 0.1e-3);
 }
 
+// Two blocks that come, one of which is drawn, the other held; nothing acts on them before.
+TEST(Events, PartsThatComeCanBeSelectedByTheScene) {
+  const flexel::test::Scratch scratch;
+  const auto block = [&](const std::string& name, double x) {
+    BoxOptions options;
+    options.cells = {2, 2, 2};
+    options.spacing = Vec3::Constant(1e-2);
+    options.name = name;
+    options.origin = Vec3(x, 0, 0);
+    write_body(box_body(options), scratch.path(name + ".vtu"));
+    return event("2 ms", "do = \"add\"\nbody = \"" + scratch.path(name + ".vtu") + "\"");
+  };
+  const std::string text =
+      "[run]\ntime = \"10 ms\"\n[gravity]\nacceleration = [0, 0, \"-1 m/s2\"]\n[[load]]\nwhere = "
+      "\"drawn/x1\"\nforce = [\"0.4 N\", 0, 0]\n[[fix]]\nwhere = \"held\"\n" +
+      block("drawn", 0.2) + block("held", 0.4);
+  const TimedCase made = run_timed(bar_of_cells(), gum_scene_with(text));
+  expect_books_close(made.result);
+  ASSERT_EQ(made.body.parts.size(), 3u);
+  const auto momentum = [&](std::size_t part, std::size_t axis) {
+    double sum = 0;
+    for (std::uint32_t e = made.body.parts[part].element_begin; e < made.body.parts[part].element_end; ++e)
+      sum += made.body.element_columns.at("velocity").values[3 * e + axis];
+    return sum;
+  };
+  for (std::uint32_t e = made.body.parts[2].element_begin; e < made.body.element_count(); ++e)
+    EXPECT_EQ(made.body.position[e], made.body.rest[e]) << "held from the moment that it came";
+  EXPECT_EQ(momentum(2, 2), 0);
+  // 8 g drawn by 0.4 N for 8 ms; the middle moves by half of a t^2
+  Vec3 middle = Vec3::Zero();
+  const Part& drawn = made.body.parts[1];
+  for (std::uint32_t e = drawn.element_begin; e < drawn.element_end; ++e)
+    middle += (made.body.position[e] - made.body.rest[e]) / (drawn.element_end - drawn.element_begin);
+  EXPECT_NEAR(middle.x(), 0.5 * 50 * 0.008 * 0.008, 0.1 * 0.5 * 50 * 0.008 * 0.008);
+  EXPECT_THROW(
+      (void)run_timed(bar_of_cells(), gum_scene_with("[run]\ntime = \"1 ms\"\n[[fix]]\nwhere = \"drwn\"\n")),
+      InputError);
+}
+
 TEST(Events, WrongEntriesAreRefused) {
   const auto message = [](const std::string& text) -> std::string {
     try {

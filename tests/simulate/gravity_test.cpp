@@ -7,6 +7,7 @@
 #include <random>
 
 #include "base/error.h"
+#include "formats/lattice/merge.h"
 #include "simulate/effects/gravity.h"
 #include "simulate/result/options.h"
 #include "simulate/scene/scene.h"
@@ -173,6 +174,36 @@ TEST(SourceGravity, AnElementFollowsKeplersEllipse) {
   expect_books_close(made.result);
 }
 
+// A source that is a part moves, and is drawn by as much: both circle about their centre of mass with
+// omega^2 = G (M + m) / d^3.
+TEST(SourceGravity, APartThatMovesDrawsAndIsDrawn) {
+  testing::CentreOptions options;
+  options.spacing = 0.1;
+  options.voxels = {2, 2, 2};
+  options.name = "sun";
+  Body body = testing::centre_body(options);
+  options.voxels = {1, 1, 1};
+  options.name = "moon";
+  options.origin = Vec3(1.05, 0.05, 0.05);
+  append(body, testing::centre_body(options));
+  const double distance = 1, sun = 8, moon = 1, constant = 0.5;  // m, kg
+  const double omega = std::sqrt(constant * (sun + moon) / std::pow(distance, 3)), period = 2 * pi / omega;
+  std::vector<Vec3> velocity(9, Vec3(0, -omega * distance * moon / (sun + moon), 0));
+  velocity[8].y() = omega * distance * sun / (sun + moon);
+  set_velocity(body, velocity);
+  Scene scene = gravity_scene(3 * period, constant);
+  Gravity::Source source;
+  source.part = "sun";
+  scene.get<Gravity>().sources = {source};
+  scene.run.step = period / 1000;
+  const TimedCase made = run_timed(body, scene);
+  const std::vector<double>& turning = made.history.column("angular momentum z");
+  for (const double each : turning) EXPECT_NEAR(each, turning[0], 1e-9 * turning[0]);
+  EXPECT_LT((made.body.position[8] - made.body.rest[8]).norm(), 0.01);
+  expect_books_close(made.result);
+  for (const double each : made.history.column("momentum y")) EXPECT_NEAR(each, 0, 1e-12);
+}
+
 TEST(SourceGravity, OfTheEarthIsItsWeight) {
   const Body body = pieces_of_gum();
   Scene scene = gravity_scene(1e-3, Gravity::kNewton);
@@ -273,6 +304,7 @@ TEST(GravityScene, RefusesWhatItCannotUse) {
               HasSubstr("give one of them"));
   EXPECT_THAT(message("[gravity]\nsource = { at = [0, 0, 0], mass = \"-1 kg\" }\n"), HasSubstr("above 0"));
   EXPECT_THAT(message("[gravity]\nsource = { at = [0, 0, 0] }\n"), HasSubstr("needs \"mass\""));
+  EXPECT_THAT(message("[gravity]\nsource = { at = [0, 0, 0], part = \"sun\" }\n"), HasSubstr("one of them"));
   Body body = pieces_of_gum();
   Scene scene = gravity_scene(1, 1);
   scene.run = {};

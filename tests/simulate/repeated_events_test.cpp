@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "formats/lattice/fused_points.h"
 #include "formats/lattice/merge.h"
+#include "simulate/events/edit.h"
 #include "simulate/simulate.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/timed_case.h"
@@ -152,6 +153,17 @@ TEST(RepeatedEvents, WhatChangesNoCellIsRefusedOrPassedOver) {
   }
   // Friction is of elements.
   (void)run_scene(scene_with("[[event]]\nat = \"1 ms\"\ndo = \"edit\"\nfriction = 2\n" + where));
+}
+
+TEST(RepeatedEvents, WhatAnEventHasEditedIsForgottenWhereTheRunEndsBeforeItsLastTime) {
+  Body body = block_of("work", {2, 2, 2}, Vec3::Zero());
+  for (const char* name : {"edited_12", "edited_by", "edited_", "edited_1x"})
+    body.cell_columns[name] = {1, std::vector<double>(body.cell_count(), 1)};
+  body.element_columns["edited_7"] = {1, std::vector<double>(body.element_count(), 1)};
+  forget_edits(body);
+  EXPECT_FALSE(body.cell_columns.contains("edited_12"));
+  EXPECT_EQ(body.cell_columns.size(), 3u) << "others are the user's";
+  EXPECT_TRUE(body.element_columns.empty());
 }
 
 TEST(RepeatedEvents, TimesThatRoundingTellsApartAreOne) {
