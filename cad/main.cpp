@@ -82,11 +82,11 @@ Bytes answer(std::size_t threads, const Work& work) {
   }));
 }
 
-Bytes do_job(const CadJob& job) {
+Bytes do_job(const CadJob& job, const TellShare& tell) {
   if (job.write) {
     const ThreadLimit limit(static_cast<int>(job.write->threads));
     return answer<CadWritten>(job.write->threads,
-                              [&](const Warn& warn) { return write_deformed(*job.write, warn); });
+                              [&](const Warn& warn) { return write_deformed(*job.write, warn, tell); });
   }
   return answer<CadMesh>(job.read->threads,
                          [&](const Warn& warn) { return mesh_of(read_shape(*job.read, warn), *job.read); });
@@ -98,6 +98,7 @@ Bytes do_job(const CadJob& job) {
 int main() {
   std::set_terminate(flexel::cad::end_on_terminate);
   // What the libraries would tidy up is gone with the process.
-  _exit(flexel::serve_job(
-      "flexel-cad", [](const flexel::Bytes& job) { return flexel::cad::do_job(flexel::unpack_job(job)); }));
+  _exit(flexel::serve_job("flexel-cad", [](const flexel::Bytes& job, const flexel::TellShare& tell) {
+    return flexel::cad::do_job(flexel::unpack_job(job), tell);
+  }));
 }

@@ -12,6 +12,7 @@
 #include "base/human.h"
 #include "base/printable.h"
 #include "base/program/arguments.h"
+#include "base/program/brief_output.h"
 #include "base/program/progress.h"
 #include "base/program/termination.h"
 #include "base/units.h"
@@ -350,7 +351,9 @@ int info_command(int argc, char** argv) {
     options.largest_edge = parse_quantity(edge, Dimension::length);
     if (!(*options.largest_edge > 0)) throw InputError("--edge: must be above zero");
   }
-  Progress progress("flexel", Progress::Mode::quiet);
+  const BriefOutput bar_alone(true);
+  Progress progress("flexel", words ? Progress::Mode::quiet : Progress::Mode::automatic);
+  progress.stage("import");
   options.warn = [&](const std::string& line) { progress.warn(line); };
   Surface surface = import_surface(files.front(), options);
   for (std::size_t f = 1; f < files.size(); ++f) append(surface, import_surface(files[f], options));
@@ -359,8 +362,10 @@ int info_command(int argc, char** argv) {
     return kExitDone;
   }
   for (const std::string& line : size_warnings(surface)) progress.warn(line);
+  progress.stage("measure");
   const Known known = look_at(surface);
   if (!thickness.empty()) write_thickness(surface, thickness);
+  progress.finish();
   print(json ? info_json(surface, known) : printable_lines(info_text(surface, known)));
   return kExitDone;
 }

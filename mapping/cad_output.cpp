@@ -232,8 +232,12 @@ std::vector<CadAnswer> write_cad(const Body& body, const MapReport& found, const
     each.job.tolerance = tolerance_of(arguments.tolerance, body);
     if (scale == 1) each.job.volume = found.quality.volume_after / found.quality.volume_before;
     each.job.threads = thread_count();
-    each.written =
-        run_job(each.job, limits_of(body), where, [&](const std::string& line) { progress.warn(line); });
+    const auto begun = static_cast<double>(&each - jobs.data());
+    each.written = run_job(
+        each.job, limits_of(body), where, [&](const std::string& line) { progress.warn(line); },
+        [&](double share) {
+          progress.update((begun + share) / static_cast<double>(jobs.size()), "CAD faces");
+        });
     each.job.body = {};
     for (const std::string& line : faults(each.written, found, scale)) wrong.push_back(line);
     for (const std::size_t i : each.outputs)

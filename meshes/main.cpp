@@ -32,5 +32,7 @@ Bytes do_job(const Bytes& bytes) {
 
 int main() {
   // What the libraries would tidy up is gone with the process.
-  _exit(flexel::serve_job("flexel-meshes", flexel::meshes::do_job));
+  _exit(flexel::serve_job("flexel-meshes", [](const flexel::Bytes& job, const flexel::TellShare&) {
+    return flexel::meshes::do_job(job);
+  }));
 }

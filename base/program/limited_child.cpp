@@ -180,7 +180,8 @@ ChildLimits limits_of_child(double seconds, double memory) {
   return {seconds * static_cast<double>(thread_count()), 3 * seconds, memory};
 }
 
-ChildOutput run_in_child(const std::function<int(int out)>& body, const ChildLimits& limits) {
+ChildOutput run_in_child(const std::function<int(int out)>& body, const ChildLimits& limits,
+                         const HearOutput& hear) {
   using Clock = std::chrono::steady_clock;
   constexpr int kGlance = 50;  // ms
   check_stop();
@@ -196,13 +197,15 @@ ChildOutput run_in_child(const std::function<int(int out)>& body, const ChildLim
     last = Clock::now();
     if (waited >= limits.wall) return {ChildEnd::out_of_time, {}};
     if (child.memory() > limits.memory) return {ChildEnd::out_of_memory, {}};
+    if (hear) hear(output.bytes);
   }
   output.end = end_of(child.end());
   if (output.end != ChildEnd::finished) output.bytes.clear();
   return output;
 }
 
-ChildOutput run_limited(const std::string& program, const Bytes& input, const ChildLimits& limits) {
+ChildOutput run_limited(const std::string& program, const Bytes& input, const ChildLimits& limits,
+                        const HearOutput& hear) {
   const MemoryFile file(input);
   return run_in_child(
       [&](int out) -> int {
@@ -210,7 +213,7 @@ ChildOutput run_limited(const std::string& program, const Bytes& input, const Ch
         execl(program.c_str(), program.c_str(), nullptr);
         return kChildNotStarted;
       },
-      limits);
+      limits, hear);
 }
 
 }  // namespace flexel

@@ -33,14 +33,18 @@ struct ChildOutput {
   Bytes bytes;  // what the child wrote, once finished
 };
 
+// Called now and then while the child runs, with all that it has written so far.
+using HearOutput = std::function<void(const Bytes& so_far)>;
+
 // Runs `body` in a child (fork) and returns what it writes to the descriptor that it gets; `body` returns the
 // child's code. Ctrl-C and time limits end the child, and throw here what check_stop() throws; the child never
 // outlives this process. It prints nothing. What `body` throws is a crash, std::bad_alloc apart. Throws InputError:
 // no process can be started.
-[[nodiscard]] ChildOutput run_in_child(const std::function<int(int out)>& body, const ChildLimits& limits);
+[[nodiscard]] ChildOutput run_in_child(const std::function<int(int out)>& body, const ChildLimits& limits,
+                                       const HearOutput& hear = {});
 
 // The same for another program, which finds `input` on stdin and writes to stdout.
 [[nodiscard]] ChildOutput run_limited(const std::string& program, const Bytes& input,
-                                      const ChildLimits& limits);
+                                      const ChildLimits& limits, const HearOutput& hear = {});
 
 }  // namespace flexel

@@ -131,7 +131,12 @@ DeformedGeometry::DeformedGeometry(const TopoDS_Shape& shape, const ShapeMap& ma
   edge_.resize(edges_.Extent());
   vertex_.resize(vertices_.Extent());
   parallel_for_each(
-      face_.size(), [&](std::size_t i) { fit_face(i); }, 1);
+      face_.size(),
+      [&](std::size_t i) {
+        fit_face(i);
+        if (options_.face_done) options_.face_done();
+      },
+      1);
   parallel_for_each(
       edge_.size(), [&](std::size_t i) { fit_edge(i); }, 4);
   for (std::size_t i = 0; i < vertex_.size(); ++i) move_vertex(i);

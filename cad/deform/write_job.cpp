@@ -13,6 +13,7 @@
 #include <TopoDS_Face.hxx>
 #include <TopoDS_Vertex.hxx>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <optional>
 
@@ -41,6 +42,31 @@ constexpr double kFitShare = 0.75;
 constexpr int kManyPoints =
     5000;  // of a face: those that a FaceMask finds in it are not looked for in its edges
 
+// Tells how much is done: faces are fitted and then judged, in any order; the files are written and read again.
+class Done {
+ public:
+  Done(std::size_t faces, const TellShare& tell)
+      : whole_(std::max<std::size_t>(1, kFace * faces)), tell_(tell) {}
+  void fitted() { add(kFit); }
+  void judged() { add(kFace - kFit); }
+  // `share` of the files.
+  void written(double share) const {
+    if (tell_) tell_(kFaces + (1 - kFaces) * share);
+  }
+
+ private:
+  // Of the time of a face its fit takes three parts of four, and all faces take most of the whole.
+  static constexpr std::size_t kFace = 4, kFit = 3;
+  static constexpr double kFaces = 0.8;
+  void add(std::size_t work) {
+    const double share = static_cast<double>(done_ += work) / static_cast<double>(whole_);
+    if (tell_) tell_(kFaces * std::min(1.0, share));
+  }
+  std::size_t whole_;
+  std::atomic<std::size_t> done_ = 0;
+  const TellShare& tell_;
+};
+
 // What one job works on.
 struct Work {
   Body body;
@@ -51,12 +77,14 @@ struct Work {
   double expected_volume = 1;             // of the mapped triangles, beside that at rest
   std::size_t loose_faces = 0;            // of no solid
   CadWritten written;
+  Done done;
 
-  Work(Body deformed, const CadWriteJob& job)
+  Work(Body deformed, const CadWriteJob& job, const TellShare& tell)
       : body(std::move(deformed)),
         field(body, mapping::map_method(job.method), job.scale),
         polygons(body),
-        first_face(body.parts.size(), kNoFace) {
+        first_face(body.parts.size(), kNoFace),
+        done(body.surface.faces.size(), tell) {
     for (std::uint32_t f = 0; f < body.surface.faces.size(); ++f) {
       std::uint32_t& first = first_face[body.surface.faces[f].part];
       if (first == kNoFace) first = f;
@@ -222,7 +250,12 @@ void judge_faces(Work& work, const DeformedGeometry& geometry, const NodeMap& ma
       throw InputError(fmt::format("face {} cannot be deformed: no surface goes through its points",
                                    face_name(work, map.place(i))));
   parallel_for_each(
-      count, [&](std::size_t i) { checks[i] = check_face(geometry, i, map, unit, spacing); }, 1);
+      count,
+      [&](std::size_t i) {
+        checks[i] = check_face(geometry, i, map, unit, spacing);
+        work.done.judged();
+      },
+      1);
   for (std::size_t i = 0; i < count; ++i) {
     const std::string name = face_name(work, map.place(i));
     const double deviation = std::max(checks[i].deviation, unit * geometry.face(i).error);
@@ -282,6 +315,7 @@ void deform_node(Work& work, CadNode& node, const TopLoc_Location& here, double 
   FitOptions options;
   options.tolerance = kFitShare * work.tolerance / unit;
   options.spacing = work.body.parts[part].lattice.spacing.minCoeff() / unit;
+  options.face_done = [&] { work.done.fitted(); };
   const ShapeMap shape_map{[&](std::size_t face) { return map.of_face(face); },
                            [&] { return map.elsewhere(); }};
   const DeformedGeometry geometry(node.shape, shape_map, options);
@@ -377,8 +411,8 @@ void read_again(const CadWritten& written, CadFile& file, const std::string& for
 
 }  // namespace
 
-CadWritten write_deformed(const CadWriteJob& job, const Warn& warn) {
-  Work work(read_body(job.body, "the body"), job);
+CadWritten write_deformed(const CadWriteJob& job, const Warn& warn, const TellShare& tell) {
+  Work work(read_body(job.body, "the body"), job, tell);
   std::vector<CadTree> trees;
   for (std::uint32_t s = 0; s < work.body.surface.sources.size(); ++s)
     trees.push_back(deformed_source(work, s, job.formats, warn));
@@ -393,6 +427,8 @@ CadWritten write_deformed(const CadWriteJob& job, const Warn& warn) {
     CadFile file{write_tree(trees, format)};
     read_again(work.written, file, format, trees.front().unit);
     work.written.files.push_back(std::move(file));
+    work.done.written(static_cast<double>(work.written.files.size()) /
+                      static_cast<double>(job.formats.size()));
   }
   return std::move(work.written);
 }

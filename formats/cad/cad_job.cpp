@@ -53,13 +53,14 @@ JobAnswer<Result> unpacked(std::uint64_t kind, std::span<const std::byte> bytes,
   return answer;
 }
 
-Bytes run(const Bytes& job, const ChildLimits& limits, const std::string& where, const JobWords& words) {
+Bytes run(const Bytes& job, const ChildLimits& limits, const std::string& where, const JobWords& words,
+          const TellShare& hear = {}) {
 #ifndef FLEXEL_STEP
   throw InputError(where,
                    "is a CAD file, and this build has no OpenCASCADE: configure with -DFLEXEL_STEP=ON (needs "
                    "OpenCASCADE 7.6.3), or export the part as STL");
 #endif
-  return run_job({"flexel-cad", "OpenCASCADE", "OpenCASCADE 7.6.3"}, job, limits, where, words);
+  return run_job({"flexel-cad", "OpenCASCADE", "OpenCASCADE 7.6.3"}, job, limits, where, words, hear);
 }
 
 }  // namespace
@@ -110,10 +111,11 @@ CadMesh run_job(const CadReadJob& job, const ChildLimits& limits, const std::str
 }
 
 CadWritten run_job(const CadWriteJob& job, const ChildLimits& limits, const std::string& where,
-                   const std::function<void(const std::string&)>& warn) {
+                   const std::function<void(const std::string&)>& warn, const TellShare& hear) {
   const Bytes answer = run(pack(job), limits, where,
                            {"deform it", "its surfaces cannot be deformed", "its surfaces are too much",
-                            "a larger --tolerance takes less, or write a mesh (STL, OBJ, ...)"});
+                            "a larger --tolerance takes less, or write a mesh (STL, OBJ, ...)"},
+                           hear);
   CadWritten written = result_of(unpack_written(answer, where), where, warn);
   if (written.files.size() != job.formats.size())
     throw InputError(where, "is damaged: OpenCASCADE makes nothing sound of it");

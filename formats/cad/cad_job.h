@@ -94,10 +94,12 @@ struct CadJob {
                                                    const std::string& where);
 
 // Has flexel-cad do it. Throws InputError(where, ...): it crashes, takes more than the limits, or answers what does not
-// fit together; its own refusal. `instead`: what to do where the limits are passed. Calls `warn` with its warnings.
+// fit together; its own refusal. `instead`: what to do where the limits are passed. Calls `warn` with its warnings, and
+// `hear` with how much is done.
 [[nodiscard]] CadMesh run_job(const CadReadJob& job, const ChildLimits& limits, const std::string& instead,
                               const std::function<void(const std::string&)>& warn);
 [[nodiscard]] CadWritten run_job(const CadWriteJob& job, const ChildLimits& limits, const std::string& where,
-                                 const std::function<void(const std::string&)>& warn);
+                                 const std::function<void(const std::string&)>& warn,
+                                 const TellShare& hear = {});
 
 }  // namespace flexel

@@ -16,6 +16,8 @@
 namespace flexel {
 
 using Warn = std::function<void(const std::string&)>;
+// How much of a job is done, in [0, 1].
+using TellShare = std::function<void(double share)>;
 
 struct ForeignProgram {
   const char* name;     // "flexel-cad"
@@ -94,9 +96,12 @@ struct JobWords {
 };
 
 // The bytes of the answer. Throws InputError: the program is not there or does not start; InputError(where, ...): it
-// crashes, or takes more than the limits.
+// crashes, or takes more than the limits. `hear`: called on this thread with the shares that the program tells.
 [[nodiscard]] Bytes run_job(const ForeignProgram& program, const Bytes& job, const ChildLimits& limits,
-                            const std::string& where, const JobWords& words);
+                            const std::string& where, const JobWords& words, const TellShare& hear = {});
+
+// Splits what came back: the shares that were told, whose last goes to `hear`, and the answer after them.
+[[nodiscard]] Bytes answer_in(Bytes output, const TellShare& hear);
 
 // Passes on what the answer says: calls `warn`, throws its InputError, or std::runtime_error where the program failed.
 template <class Result>
@@ -123,7 +128,8 @@ template <class Result, class Work>
 }
 
 // There too: reads the job, writes what `work` makes of it, and returns the exit status (ChildCode). Stdout is
-// the answer's alone: what a library prints there is dropped.
-[[nodiscard]] int serve_job(const char* program, const std::function<Bytes(const Bytes& job)>& work);
+// the answer's alone: what a library prints there is dropped. `work` may tell, from any thread, how much it has done.
+[[nodiscard]] int serve_job(const char* program,
+                            const std::function<Bytes(const Bytes& job, const TellShare& tell)>& work);
 
 }  // namespace flexel

@@ -5,14 +5,17 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <cmath>
 #include <csignal>
 #include <stdexcept>
 #include <thread>
 
 #include "base/error.h"
+#include "base/files/memory_file.h"
 #include "base/stop.h"
 #include "formats/cad/cad_job.h"
 #include "tests/sanitized.h"
@@ -53,6 +56,41 @@ TEST(LimitedChild, WhatItReturnsComesBackWhole) {
   EXPECT_EQ(output.end, ChildEnd::finished);
   EXPECT_EQ(output.bytes, bytes);
   expect_no_child();
+}
+
+TEST(LimitedChild, WhatItWritesIsHeardMeanwhile) {
+  std::vector<std::size_t> heard;
+  const ChildOutput output = run_in_child(
+      [](int out) -> int {
+        const bool begun = write(out, "a", 1) == 1;
+        usleep(400'000);
+        return begun && write(out, "b", 1) == 1 ? kChildFinished : kChildFailed;
+      },
+      {}, [&](const Bytes& so_far) { heard.push_back(so_far.size()); });
+  EXPECT_EQ(output.bytes.size(), 2u);
+  EXPECT_THAT(heard, testing::Contains(1u));
+  EXPECT_TRUE(std::is_sorted(heard.begin(), heard.end()));
+}
+
+TEST(ChildJob, SharesComeBeforeTheAnswerAndAreNoPartOfIt) {
+  const Bytes answer = some_bytes(100'000);
+  const MemoryFile job(some_bytes(10));
+  const ChildOutput output = run_in_child(
+      [&](int out) -> int {
+        if (dup2(job.descriptor(), STDIN_FILENO) < 0 || dup2(out, STDOUT_FILENO) < 0) return kChildFailed;
+        return serve_job("test", [&](const Bytes&, const TellShare& tell) {
+          for (int n = 0; n <= 1000; ++n) tell(1e-3 * n);
+          tell(std::nan(""));
+          return answer;
+        });
+      },
+      {});
+  double heard = 0;
+  EXPECT_EQ(answer_in(output.bytes, [&](double share) { heard = share; }), answer);
+  EXPECT_NEAR(heard, 1, 0.02);
+  EXPECT_GT(output.bytes.size(), answer.size());
+  EXPECT_LE(output.bytes.size(), answer.size() + 100 * 16) << "a share a percent is enough";
+  EXPECT_EQ(answer_in(answer, {}), answer);
 }
 
 TEST(LimitedChild, EveryCrashIsOneOutcome) {

@@ -229,6 +229,9 @@ def test_paraview():
     expect(failed.code == 1 and "von_mises" in failed.err, f"{failed}")
 
 
+NOT_IN_DEBIAN = {"pyvista": ": Debian 12 has no package of it (pip install pyvista)"}
+
+
 def python_module(*names):
     if os.environ.get("FLEXEL_HAS_PYTHON") != "ON":
         raise Skip("built without the Python module")
@@ -236,7 +239,7 @@ def python_module(*names):
         try:
             __import__(name)
         except ImportError:
-            raise Skip(f"{name} is not installed") from None
+            raise Skip(f"{name} is not installed{NOT_IN_DEBIAN.get(name, '')}") from None
 
 
 def test_python_of_the_page():

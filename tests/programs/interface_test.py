@@ -119,6 +119,17 @@ def test_an_interactive_bash_quotes_once():
     expect_typed("flexel info my", "flexel", "info", "my part.stl")
 
 
+def test_an_interactive_bash_within_quotation_marks_and_after_equals():
+    """--push "zmax: 0 0 -100 N" has blanks, so that its user begins with the mark."""
+    make()
+    pathlib.Path("part.stl").write_bytes(ascii_stl(box_triangles()))
+    for line, word in (('flexel deform part.stl --push "zma', "zmax"), ("flexel deform part.stl --push 'zma", "zmax"),
+                       ('flexel deform part.stl --material "spri', "spring steel")):
+        expect_typed(line, "flexel", "deform", "part.stl", "--" + line.split("--")[1].split()[0], word)
+    for option, word in (("--fix=zma", "--fix=zmax"), ("--material=spri", "--material=spring steel"), ("--heal=wr", "--heal=wrap")):
+        expect_typed(f"flexel deform part.stl {option}", "flexel", "deform", "part.stl", word)
+
+
 def test_bash_completes_kinds_of_files():
     make()
     for name in ("a.step", "B.STL", "c.vtu", "d.toml", "e.txt"):
@@ -145,6 +156,9 @@ def test_an_interactive_zsh():
     expect_typed("flexel deform my\\ part.stl --scene my", "flexel", "deform", "my part.stl", "--scene", "my scene.toml", program="zsh")
     expect_typed("flexel export --mesh h", "flexel", "export", "--mesh", "hex", program="zsh")
     expect_typed("flexel-map --method sm", "flexel-map", "--method", "smooth", program="zsh")
+    expect_typed('flexel deform my\\ part.stl --push "zma', "flexel", "deform", "my part.stl", "--push", "zmax", program="zsh")
+    for option, word in (("--fix=zma", "--fix=zmax"), ("--material=spri", "--material=spring steel"), ("--heal=wr", "--heal=wrap")):
+        expect_typed(f"flexel deform my\\ part.stl {option}", "flexel", "deform", "my part.stl", word, program="zsh")
 
 
 def offered_by_fish(line):
@@ -166,6 +180,8 @@ def test_fish_completes_faces_materials_and_files():
     expect(offered_by_fish("flexel deform a.stl --scene ")[0] == "c.toml", offered_by_fish("flexel deform a.stl --scene "))
     expect(set(offered_by_fish("flexel export --mesh ")) == {"hex", "tet"}, offered_by_fish("flexel export --mesh "))
     expect("mm" in offered_by_fish("flexel info --unit "), offered_by_fish("flexel info --unit "))
+    expect(offered_by_fish('flexel deform a.stl --push "zm') == ["zmax", "zmin"], offered_by_fish('flexel deform a.stl --push "zm'))
+    expect(offered_by_fish("flexel deform a.stl --fix=zm") == ["--fix=zmax", "--fix=zmin"], offered_by_fish("flexel deform a.stl --fix=zm"))
 
 
 def test_other_shells_read_theirs():

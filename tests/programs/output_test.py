@@ -73,6 +73,26 @@ def test_terminal_as_stdout():
         os.close(slave)
 
 
+def test_info_shows_a_bar_on_a_terminal_alone():
+    """On stderr, where the reading of a large part takes seconds; a log and completion (--words) have none."""
+    try:
+        master, slave = pty.openpty()
+    except OSError as error:
+        raise Skip(f"no terminal to be had: {error}") from error
+    try:
+        part, terminal = box(), dict(os.environ, TERM="xterm")
+        expect_ok(run("flexel", "info", "--words", part))
+        subprocess.run([BIN / "flexel", "info", "--words", part], stdout=subprocess.DEVNULL, stderr=slave, env=terminal, check=True)
+        subprocess.run([BIN / "flexel", "info", part], stdout=subprocess.DEVNULL, stderr=slave, env=terminal, check=True)
+        said = os.read(master, 4096)
+        expect(said.startswith(b"\rflexel: import [") and said.endswith(b"\r\x1b[K"), f"{said}")
+        expect(said.count(b"import [") == 1, f"--words too: {said}")
+        expect(not expect_ok(run("flexel", "info", part)).err, "a log has lines")
+    finally:
+        os.close(master)
+        os.close(slave)
+
+
 def test_missing_folder():
     expect_error(run("flexel-voxelize", box(), "-o", "absent/out.vtu"), "flexel-voxelize", "absent/out.vtu", "no such file")
 

@@ -7,7 +7,7 @@ import sys
 import threading
 import time
 
-from shared import PULL, SWING, box, box_body, check, main, module
+from shared import PULL, SWING, box, box_body, bracket, check, main, module, need_step
 
 # A run that takes minutes; the child says when it begins.
 LONG = """
@@ -220,6 +220,19 @@ def test_progress():
 
     with check.assertRaises(LookupError):
         flexel.simulate(box_body(flexel, 0.001), SWING.replace("TIME", "100 s"), progress=refuse)
+
+
+def test_progress_of_cad_files():
+    """flexel-cad tells how many faces it has done, and so the time left can be told."""
+    flexel = module()
+    need_step()
+    bracket()
+    seen = []
+    flexel.deform("bracket.step", output="bent.step", size="4 mm", fix="bracket/1", push={"bracket/2": (0, 0, -100)}, material="PLA",
+                  progress=lambda *each: seen.append(each))
+    shares = [share for stage, share, note, _ in seen if stage == "write" and note == "CAD faces"]
+    check.assertTrue(any(0 < share < 1 for share in shares), f"{shares}")
+    check.assertEqual(shares, sorted(shares))
 
 
 def test_nothing_on_stderr_without_a_terminal():
