@@ -295,13 +295,14 @@ void DeformedGeometry::move_vertex(std::size_t i) {
   vertex_[i].tolerance = BRep_Tool::Tolerance(vertex) * stretch_at(map, at, kStep * options_.spacing);
 }
 
-// A vertex is where its edges end: in the mean of those that were fitted, or of those that stayed what they were. Fitted
-// ones then end in it, to the last digit: readers of STEP look for a vertex along its curves, and one beside the seam of
-// a closed curve cuts that curve there, which OpenCASCADE takes for no length at all.
+// A vertex is where its edges end: in the mean of those that were fitted, or of those that stayed what they were. At a pole
+// of a surface it is the pole: edges that end beside it pass it, where parameters turn about, and meshers (gmsh) do not come
+// to an end there. Fitted ones then end in it, to the last digit: readers of STEP look for a vertex along its curves, and
+// one beside the seam of a closed curve cuts that curve there, which OpenCASCADE takes for no length at all.
 void DeformedGeometry::join_ends() {
   struct Ends {
-    gp_XYZ kept{0, 0, 0}, fitted{0, 0, 0};
-    int kept_count = 0, fitted_count = 0;
+    gp_XYZ kept{0, 0, 0}, pole{0, 0, 0}, fitted{0, 0, 0};
+    int kept_count = 0, pole_count = 0, fitted_count = 0;
   };
   std::vector<Ends> ends(vertex_.size());
   const auto for_ends = [&](std::size_t i, const auto& act) {
@@ -309,18 +310,29 @@ void DeformedGeometry::join_ends() {
     TopExp::Vertices(TopoDS::Edge(edges_(static_cast<Standard_Integer>(i) + 1).Oriented(TopAbs_FORWARD)),
                      vertices[0], vertices[1]);
     for (int end = 0; end < 2; ++end)
-      if (!vertices[end].IsNull() && !edge_[i].curve.IsNull())
+      if (!vertices[end].IsNull())
         act(static_cast<std::size_t>(vertices_.FindIndex(vertices[end]) - 1), end == 0);
   };
-  for (std::size_t i = 0; i < edge_.size(); ++i)
+  for (std::size_t i = 0; i < edge_.size(); ++i) {
+    const TopoDS_Shape& shape = edges_(static_cast<Standard_Integer>(i) + 1);
+    const bool pole = BRep_Tool::Degenerated(TopoDS::Edge(shape));
+    const std::vector<OnFace> faces = pole ? on_faces(shape) : std::vector<OnFace>();
     for_ends(i, [&](std::size_t v, bool first) {
+      for (const OnFace& face : faces) {
+        ends[v].pole += face.at(first ? 0 : 1);
+        ++ends[v].pole_count;
+      }
+      if (edge_[i].curve.IsNull()) return;
       const gp_XYZ at = edge_[i].curve->Value(first ? edge_[i].begin : edge_[i].end).XYZ();
       (edge_[i].kept ? ends[v].kept : ends[v].fitted) += at;
       ++(edge_[i].kept ? ends[v].kept_count : ends[v].fitted_count);
     });
+  }
   for (std::size_t v = 0; v < vertex_.size(); ++v)
     if (ends[v].kept_count > 0)
       vertex_[v].point = gp_Pnt(ends[v].kept / ends[v].kept_count);
+    else if (ends[v].pole_count > 0)
+      vertex_[v].point = gp_Pnt(ends[v].pole / ends[v].pole_count);
     else if (ends[v].fitted_count > 0)
       vertex_[v].point = gp_Pnt(ends[v].fitted / ends[v].fitted_count);
   for (std::size_t i = 0; i < edge_.size(); ++i)

@@ -143,6 +143,44 @@ TEST(DeformShape, TolerancesOfTheShapeAreKept) {
   }
 }
 
+// The tip of a conical pocket is on the wall that it opens in, amid that wall's points: its vertex is where the cone's
+// fit has its pole, not between the fits, and edges lead away from there.
+TEST(DeformShape, AVertexAtAPoleIsThePole) {
+  const TopoDS_Shape pocket =
+      BRepAlgoAPI_Cut(BRepPrimAPI_MakeBox(60, 20, 12).Shape(),
+                      BRepPrimAPI_MakeCone(gp_Ax2(gp_Pnt(33.7, 0, 1), gp::DZ()), 6, 0, 7.7).Shape())
+          .Shape();
+  const auto wave = [](const gp_XYZ& p) {
+    return gp_XYZ(p.X(), p.Y() + std::sin(0.3 * p.X() + 0.4 * p.Z()), p.Z() + 0.5 * std::cos(0.2 * p.X()));
+  };
+  const DeformedGeometry geometry(pocket, same_everywhere(wave), {kTolerance, 5});
+  const TopoDS_Shape deformed = deform_shape(pocket, geometry).shape;
+  EXPECT_TRUE(BRepCheck_Analyzer(deformed).IsValid());
+  int poles = 0;
+  for (TopExp_Explorer each(deformed, TopAbs_FACE); each.More(); each.Next()) {
+    const TopoDS_Face& face = TopoDS::Face(each.Current());
+    for (TopExp_Explorer part(face, TopAbs_EDGE); part.More(); part.Next()) {
+      const TopoDS_Edge& edge = TopoDS::Edge(part.Current());
+      if (!BRep_Tool::Degenerated(edge)) continue;
+      ++poles;
+      double begin = 0, end = 0;
+      const Handle(Geom2d_Curve) on_face = BRep_Tool::CurveOnSurface(edge, face, begin, end);
+      const gp_Pnt2d uv = on_face->Value(begin);
+      const gp_Pnt pole = BRep_Tool::Surface(face)->Value(uv.X(), uv.Y());
+      EXPECT_LT(pole.Distance(BRep_Tool::Pnt(TopExp::FirstVertex(edge))), 1e-9);
+      for (TopExp_Explorer other(face, TopAbs_EDGE); other.More(); other.Next()) {
+        const TopoDS_Edge& beside = TopoDS::Edge(other.Current());
+        if (BRep_Tool::Degenerated(beside)) continue;
+        const bool first = TopExp::FirstVertex(beside).IsSame(TopExp::FirstVertex(edge));
+        if (!first && !TopExp::LastVertex(beside).IsSame(TopExp::FirstVertex(edge))) continue;
+        const Handle(Geom_Curve) curve = BRep_Tool::Curve(beside, begin, end);
+        EXPECT_LT(curve->Value(first ? begin : end).Distance(pole), 1e-9);
+      }
+    }
+  }
+  EXPECT_EQ(poles, 1);
+}
+
 // OpenCASCADE meshes each face with the points of its edges: a face that it cannot mesh is left out without a word.
 TEST(DeformShape, EveryFaceCanBeMeshed) {
   for (const auto& [name, shape] : samples()) {

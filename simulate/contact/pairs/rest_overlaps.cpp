@@ -1,9 +1,10 @@
-// A first pass over pairs of faces finds the mean overlap around each point, a second one whether all overlap by nearly that.
+// A first pass over pairs of faces finds how surfaces overlap around each point as a whole, by least squares; a second one
+// whether all pairs there overlap by nearly that.
 #include "simulate/contact/pairs/rest_overlaps.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace flexel::simulate {
 namespace {
@@ -11,9 +12,10 @@ namespace {
 constexpr double kOpposite = 0.9998;  // cosine of 1 degree, from which faces are as parts of one plane
 constexpr double kBendReach = 3;      // spacings, within which a curved surface turns; its facets may be long
 constexpr double kLooksAt = 0.5;      // cosine from which surfaces face each other
-constexpr double kScatter = 0.5;      // standard deviations that a mean must exceed to be an interference
-constexpr double kFitting = 0.9;      // share of the pairs' weight that overlaps by the mean, but for facets
-constexpr double kNotFitting = std::numeric_limits<double>::quiet_NaN();
+constexpr double kScatter = 0.5;      // standard deviations that the whole must exceed to be more than facets
+constexpr double kFitting = 0.9;      // share of the pairs' weight that overlaps by the whole, but for facets
+constexpr double kRidge = 1e-3;       // variance of normals below which they do not tell an offset
+constexpr double kMostOffset = 1;     // spacings: a larger one is none, but the surfaces' curvatures differ
 
 // (points) 1: a face beside which its part's surface turns by up to 60 degrees, as what is curved does, and not
 // at an edge: beyond it, its plane is not the surface.
@@ -43,24 +45,58 @@ enum Paired : std::uint8_t { kAlone, kPaired, kPairedWithSeveral };
 struct FacingPair {
   std::uint32_t i = 0, j = 0;
   double weight = 0, depth = 0, most = 0;  // N/m; m: penetration, and what facets may add to it or take
+  Vec3 normal = Vec3::Zero();              // out of i
 };
 
 // (points) Sums over the pairs of a point and of those of its part around it.
-template <class Value>
-std::vector<double> sums_around(const std::vector<FacingPair>& pairs, const Neighbours& around,
-                                std::size_t points, const Value& value) {
-  std::vector<double> own(points, 0);
+template <class Sum, class Value>
+std::vector<Sum> sums_around(const std::vector<FacingPair>& pairs, const Neighbours& around,
+                             const std::vector<Sum>& zeros, const Value& value) {
+  std::vector<Sum> own = zeros;
   for (const FacingPair& pair : pairs) {
     own[pair.i] += value(pair, pair.i);
     own[pair.j] += value(pair, pair.j);
   }
-  std::vector<double> sums = own;
-  for (std::uint32_t a = 0; a < points; ++a)
+  std::vector<Sum> sums = own;
+  for (std::uint32_t a = 0; a < sums.size(); ++a)
     for (const std::uint32_t b : around.of(a)) {
       sums[a] += own[b];
       sums[b] += own[a];
     }
   return sums;
+}
+
+// Weighted sums of x x^T with x = (1, normal, depth): all that least squares need.
+using OverlapMoments = Eigen::Matrix<double, 5, 5>;
+
+OverlapMoments overlap_moments(const FacingPair& pair) {
+  Eigen::Matrix<double, 5, 1> x;
+  x << 1, pair.normal, pair.depth;
+  return pair.weight * x * x.transpose();
+}
+
+// The overlap of least squares; a normal along which the pairs hardly differ adds nothing to it. Its scatter is what
+// remains, its size the root mean square of the overlap itself.
+struct WholeOverlap {
+  RestFit fit;
+  double size = 0, scatter = 0;  // m
+};
+
+WholeOverlap least_squares_overlap(const OverlapMoments& sums) {
+  const double weight = sums(0, 0);
+  const OverlapMoments mean = sums / weight;
+  const Vec3 normal = mean.block<3, 1>(1, 0);
+  const double depth = mean(4, 0);
+  const Mat3 spread = mean.block<3, 3>(1, 1) - normal * normal.transpose();
+  const Vec3 slope = mean.block<3, 1>(1, 4) - depth * normal;
+  WholeOverlap whole;
+  whole.fit.offset = (spread + kRidge * Mat3::Identity()).ldlt().solve(slope);
+  whole.fit.depth = depth - whole.fit.offset.dot(normal);
+  const double explained = whole.fit.offset.dot(spread * whole.fit.offset),
+               left = mean(4, 4) - depth * depth - 2 * whole.fit.offset.dot(slope) + explained;
+  whole.size = std::sqrt(depth * depth + std::max(explained, 0.0));
+  whole.scatter = std::sqrt(std::max(left, 0.0));
+  return whole;
 }
 
 // Marks the points around which pairs are with several parts: how one of these fits says nothing of the others, but their own
@@ -93,7 +129,7 @@ RestOverlaps::RestOverlaps(const ContactSettings& settings, const ContactSurface
     : surface_(surface), released_(settings.release_time > 0) {
   if (std::count(settings.parts.begin(), settings.parts.end(), 1) < 2) return;
   curved_ = curved_faces(surface);
-  interference_.assign(curved_.size(), kNotFitting);
+  fits_.assign(curved_.size(), {});
   find_fits(materials, excluded);
 }
 
@@ -131,7 +167,7 @@ void RestOverlaps::find_fits(const ContactMaterials& materials, const ExcludedPa
       const PairConstants constants = materials.between(i, j).constants;
       const PairState rest = pair_state(at_rest(i), at_rest(j), constants);
       if (rest.near && !rest.deep && rest.gap < constants.law.hard)
-        pairs.push_back({i, j, rest.weight, -rest.gap, most(i, j, rest, constants)});
+        pairs.push_back({i, j, rest.weight, -rest.gap, most(i, j, rest, constants), rest.normal});
     }
   if (pairs.empty()) return;
   std::vector<std::uint8_t> is_paired(points.size(), kAlone);
@@ -141,22 +177,23 @@ void RestOverlaps::find_fits(const ContactMaterials& materials, const ExcludedPa
         return points[i].part == points[j].part && is_paired[i] != kAlone && is_paired[j] != kAlone;
       });
   mark_several(pairs, around, points, is_paired);
-  const auto sums = [&](const auto& value) { return sums_around(pairs, around, points.size(), value); };
-  using Pair = const FacingPair&;
-  const std::vector<double> weight = sums([](Pair pair, std::uint32_t) { return pair.weight; }),
-                            depth = sums([](Pair pair, std::uint32_t) { return pair.weight * pair.depth; }),
-                            square = sums([](Pair pair, std::uint32_t) {
-                              return pair.weight * pair.depth * pair.depth;
-                            });
-  const std::vector<double> fits = sums([&](Pair pair, std::uint32_t point) {
-    const double mean = depth[point] / weight[point];
-    return std::abs(pair.depth - mean) <= pair.most ? pair.weight : 0;
-  });
+  const std::vector<OverlapMoments> moments =
+      sums_around(pairs, around, std::vector<OverlapMoments>(points.size(), OverlapMoments::Zero()),
+                  [](const FacingPair& pair, std::uint32_t) { return overlap_moments(pair); });
+  std::vector<WholeOverlap> wholes(points.size());
+  for (std::uint32_t i = 0; i < points.size(); ++i)
+    if (moments[i](0, 0) > 0) wholes[i] = least_squares_overlap(moments[i]);
+  const std::vector<double> fitting = sums_around(
+      pairs, around, std::vector<double>(points.size(), 0), [&](const FacingPair& pair, std::uint32_t point) {
+        return std::abs(pair.depth - wholes[point].fit.along(pair.normal)) <= pair.most ? pair.weight : 0;
+      });
   for (std::uint32_t i = 0; i < points.size(); ++i) {
-    if (is_paired[i] != kPaired || !(weight[i] > 0) || !(fits[i] >= kFitting * weight[i])) continue;
-    const double mean = depth[i] / weight[i];
-    const double scatter = std::sqrt(std::max(square[i] / weight[i] - mean * mean, 0.0));
-    interference_[i] = mean > kScatter * scatter ? mean : 0;
+    const WholeOverlap& whole = wholes[i];
+    if (is_paired[i] != kPaired || !(fitting[i] >= kFitting * moments[i](0, 0)) ||
+        whole.fit.offset.norm() > kMostOffset * points[i].width)
+      continue;
+    if (whole.size > kScatter * whole.scatter) fits_[i] = whole.fit;
+    fits_[i].is_one = true;
   }
   spread_to_rims(at, is_paired);
 }
@@ -170,18 +207,21 @@ void RestOverlaps::spread_to_rims(const std::vector<Vec3>& at, const std::vector
         return points[i].part == points[j].part && (is_paired[i] == kAlone) != (is_paired[j] == kAlone) &&
                points[i].normal.dot(points[j].normal) > kLooksAt;
       });
-  std::vector<double> sum(points.size(), 0), count(points.size(), 0);
+  std::vector<RestFit> sum(points.size());
+  std::vector<double> count(points.size(), 0);
   std::vector<std::uint8_t> of_several(points.size(), 0);
   for (std::uint32_t i = 0; i < points.size(); ++i)
     for (const std::uint32_t j : beside.of(i)) {
       const std::uint32_t fit = is_paired[i] != kAlone ? i : j, rim = is_paired[i] != kAlone ? j : i;
       if (is_paired[fit] == kPairedWithSeveral) of_several[rim] = 1;
-      if (std::isnan(interference_[fit])) continue;
-      sum[rim] += interference_[fit];
+      if (!fits_[fit].is_one) continue;
+      sum[rim].depth += fits_[fit].depth;
+      sum[rim].offset += fits_[fit].offset;
       count[rim] += 1;
     }
   for (std::uint32_t i = 0; i < points.size(); ++i)
-    if (count[i] > 0 && of_several[i] == 0) interference_[i] = sum[i] / count[i];
+    if (count[i] > 0 && of_several[i] == 0)
+      fits_[i] = {true, sum[i].depth / count[i], sum[i].offset / count[i]};
 }
 
 // What overlaps a flat face presses, at any angle, and so does what faces the other squarely.
@@ -192,9 +232,14 @@ double RestOverlaps::of(std::uint32_t i, std::uint32_t j, const PairConstants& c
   const PairState rest = pair_state(at_rest(i), at_rest(j), constants);
   if (!rest.near || rest.deep || !(rest.gap < 0) || -a.normal.dot(b.normal) > kOpposite) return 0;
   // Where the surfaces fit, all that lies deeper is of facets, and of a rim behind the planes of what is beside it.
-  double mean = 0.5 * (interference_[i] + interference_[j]);
-  if (std::isnan(mean)) mean = std::isnan(interference_[i]) ? interference_[j] : interference_[i];
-  if (!std::isnan(mean)) return std::max(-rest.gap - mean, 0.0);
+  const RestFit &of_i = fits_[i], &of_j = fits_[j];
+  const double along_i = of_i.along(rest.normal), along_j = of_j.along(rest.normal);
+  if (of_i.is_one || of_j.is_one) {
+    const double whole = of_i.is_one && of_j.is_one ? 0.5 * (along_i + along_j)
+                         : of_i.is_one              ? along_i
+                                                    : along_j;
+    return std::max(-rest.gap - std::max(whole, 0.0), 0.0);
+  }
   return !released_ && -rest.gap <= most(i, j, rest, constants) ? -rest.gap : 0;
 }
 

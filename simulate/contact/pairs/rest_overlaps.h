@@ -1,14 +1,24 @@
 // Overlaps at rest of curved surfaces that fit each other, such as a pin and its hole: patches show such a surface as
 // facets, which lie in and out of those of the other by some hundredths of a spacing and are not to press for that.
 //
-// By how much two such surfaces overlap as a whole, a press fit's interference, is the mean over the pairs around a
-// point, each weighted as contact weights it, where it exceeds what they scatter by. That presses in full; only what
-// a pair overlaps by beyond it is the facets'.
+// How two such surfaces overlap as a whole is fitted to the pairs around a point by least squares, each weighted as contact
+// weights it: c + a . n along the normal n of a pair, a press fit's interference c and the offset a of a pin that is not in
+// the middle of its hole. Where that exceeds what the pairs scatter by, it presses in full; only what a pair overlaps by
+// beyond it is the facets'.
 #pragma once
 #include "simulate/contact/pairs/contact_materials.h"
 #include "simulate/contact/pairs/excluded_pairs.h"
 
 namespace flexel::simulate {
+
+// Of the pairs around a point.
+struct RestFit {
+  bool is_one = false;         // the surfaces fit each other there
+  double depth = 0;            // m, c
+  Vec3 offset = Vec3::Zero();  // m, a
+  // m, penetration along a pair's normal, which is out of the point that comes first
+  [[nodiscard]] double along(const Vec3& normal) const { return depth + offset.dot(normal); }
+};
 
 class RestOverlaps {
  public:
@@ -30,8 +40,7 @@ class RestOverlaps {
   const ContactSurface& surface_;
   bool released_ = false;             // what overlaps is let out: only surfaces that fit keep an overlap
   std::vector<std::uint8_t> curved_;  // (surface points) 1: a face of a curved surface; empty: none is asked
-  std::vector<double>
-      interference_;  // (surface points) m, of surfaces that fit each other there; nan: they do not
+  std::vector<RestFit> fits_;         // (surface points)
 };
 
 }  // namespace flexel::simulate
