@@ -398,7 +398,7 @@ class GoalRuns {
       const double size = made(std::nullopt).size;
       other.push_back(solve(size, [](std::size_t) { return true; }));
       const double error = error_of(other);
-      why_not = warning_of_strain(other.front());
+      why_not = other.front().simulated.strain_warning;  // its bar does not cover that
       if (why_not.empty() && error < guess) return std::move(other.front());
       if (why_not.empty()) why_not = "no surer: its first answer " + in_words(error);
     } catch (const InputError& error) {  // a scene that `quadratic` does not take
@@ -417,12 +417,6 @@ class GoalRuns {
     model_.use_cells();
     tried_quadratic_ = true;
     return std::move(first.front());
-  }
-  // The line that tells that strains are not small, of which model `quadratic` has no bar; "" if they are.
-  static std::string warning_of_strain(const SolvedRun& run) {
-    for (const std::string& line : run.warnings)
-      if (line.find(simulate::kSmallStrainWarning) != std::string::npos) return line;
-    return "";
   }
   // Of error_of().
   static std::string in_words(double error) {

@@ -36,7 +36,7 @@ FLEXEL_INLINE void write(const FourDoubles& from, double behind, double* to) {
 
 #ifdef FLEXEL_AVX512
 // collect_in_radius(): sixteen at a time are pushed together.
-FLEXEL_AVX512 void list_heard_by_sixteen(const float* weight, std::size_t count, ElementsInRadius& heard) {
+FLEXEL_AVX512 void collect_by_sixteen(const float* weight, std::size_t count, ElementsInRadius& heard) {
   std::size_t used = 0;
   __m512i number = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   for (std::size_t e = 0; e < count; e += 16) {
@@ -130,7 +130,7 @@ FLEXEL_CLONES void weigh_elements(const float* x, const float* y, const float* z
 void collect_in_radius(const float* weight, std::size_t count, ElementsInRadius& heard) {
 #ifdef FLEXEL_AVX512
   static const bool by_sixteen = __builtin_cpu_supports("avx512f");
-  if (by_sixteen) return list_heard_by_sixteen(weight, count, heard);
+  if (by_sixteen) return collect_by_sixteen(weight, count, heard);
 #endif
   std::size_t used = 0;
   for (std::size_t e = 0; e < count; ++e) {  // every one is written; those of weight 0 are overwritten

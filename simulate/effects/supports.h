@@ -1,11 +1,10 @@
 // Fixes and moves: material points that are held or led.
 //
 // Surface selections are tied by penalty at quadrature points q of the surface: energy 1/2 k_q |u_q - d_q|^2
-// on the tied axes with u_q = sum_a w_qa u_a (trilinear, elements of the cell under q; centre
-// placement: the nearest element), k_q = 300 E / h times
-// the point's area (E of the part, h the mean spacing; 10 to 300 moves a cantilever's tip by under one
-// percent). The led displacement d is affine in the rest position, which trilinear weights
-// reproduce, so u_q - d_q = sum_a w_qa (u_a - d(X_a)): one 8 x 8 matrix a cell holds all its points (one
+// on the tied axes with u_q = sum_a w_qa u_a (trilinear, elements of the cell under q; centre placement: the nearest
+// element), k_q = 300 E / h times the point's area (E of the part, h the mean spacing; 10 to 300 moves a cantilever's
+// tip by under one percent). The led displacement d is affine in the rest position, which trilinear weights reproduce,
+// so u_q - d_q = sum_a w_qa (u_a - d(X_a)): one 8 x 8 matrix a cell holds all its points (one
 // number an element that carries by itself, which is led to d(X) of its own place). Element
 // selections (box, sphere, half-space, part) are followed exactly and eliminated.
 //

@@ -37,18 +37,22 @@ void for_each_rim_edge(const Surface& surface, std::uint32_t polygon, const Use&
     use(surface.vertices[corners[i]], surface.vertices[corners[(i + 1) % corners.size()]]);
 }
 
+double area_of(const Surface& surface, const std::vector<std::uint32_t>& region) {
+  double area = 0;
+  for (const std::uint32_t polygon : region)
+    area += area_vector(surface.vertices, surface.polygon(polygon)).norm();
+  return area;
+}
+
 }  // namespace
 
 std::optional<double> width_amid_matter(const Surface& surface, const std::vector<std::uint32_t>& polygons,
                                         const std::vector<std::uint32_t>& held) {
   std::map<EndsOfRim, std::uint32_t> rim;  // directed edges of the region whose opposite is not of it
-  double area = 0;
-  for (const std::uint32_t polygon : polygons) {
-    area += area_vector(surface.vertices, surface.polygon(polygon)).norm();
+  for (const std::uint32_t polygon : polygons)
     for_each_rim_edge(surface, polygon, [&](const Vec3& a, const Vec3& b) {
       if (rim.erase({rim_point(b), rim_point(a)}) == 0) rim[{rim_point(a), rim_point(b)}] = polygon;
     });
-  }
   double length = 0, beside = 0;
   for (const auto& [ends, polygon] : rim)
     length += (Eigen::Map<const Vec3>(ends[1].data()) - Eigen::Map<const Vec3>(ends[0].data())).norm();
@@ -65,7 +69,7 @@ std::optional<double> width_amid_matter(const Surface& surface, const std::vecto
     });
   }
   if (!(beside > kRimShare * length) || !(length > 0)) return std::nullopt;
-  return 2 * area / length;
+  return 2 * area_of(surface, polygons) / length;
 }
 
 namespace {
@@ -95,13 +99,6 @@ std::optional<double> width_under_two_cells(const Body& body, const std::vector<
   const std::optional<double> width = width_amid_matter(body.surface, region, taken);
   const Part& part = body.parts[body.surface.polygon_part(region.front())];
   return width && *width < kCells * part.lattice.spacing.mean() ? width : std::nullopt;
-}
-
-double area_of(const Surface& surface, const std::vector<std::uint32_t>& region) {
-  double area = 0;
-  for (const std::uint32_t polygon : region)
-    area += area_vector(surface.vertices, surface.polygon(polygon)).norm();
-  return area;
 }
 
 constexpr double kAsHard = 0.5;  // of the traction: what is pushed so beside a region gives way with it

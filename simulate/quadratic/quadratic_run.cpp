@@ -32,16 +32,18 @@ namespace {
 // Stress is taken as proportional to strain: an answer is off by about the strain.
 constexpr double kNoticeable = 0.03, kTooLarge = 0.25;
 
-void judge_strain(double strain, Progress& progress) {
+// The warning that strains are not small; "" where they are. Throws DivergedError where they are large.
+std::string judge_strain(double strain) {
   constexpr const char* kAssumed = "model \"quadratic\" takes stress as proportional to strain";
   if (strain > kTooLarge)
     throw DivergedError(
         fmt::format("matter is strained by {}, and {}: that answer would be worth nothing; use "
                     "model \"cells\"",
                     human_share(strain), kAssumed));
-  if (strain > kNoticeable)
-    progress.warn(fmt::format("matter is strained by {}, and {}: {}; use model \"cells\"",
-                              human_share(strain), kAssumed, kSmallStrainWarning));
+  if (!(strain > kNoticeable)) return "";
+  return fmt::format(
+      "matter is strained by {}, and {}: about so much of the answer is left out; use model \"cells\"",
+      human_share(strain), kAssumed);
 }
 
 // Walls of a few hundredths of a cell are held by what keeps cells of slivers regular.
@@ -56,10 +58,11 @@ void judge_outside(double share, Progress& progress) {
 }
 
 // What the model leaves out, and what speaks against the answer.
-void judge(const QuadraticSystem& system, const QuadraticSolution& solution, double elastic_energy,
+void judge(const QuadraticSystem& system, const QuadraticSolution& solution, SimulateResult& result,
            Progress& progress) {
-  judge_strain(typical_strain(system, solution), progress);
-  judge_outside(energy_outside(system, solution, elastic_energy), progress);
+  result.strain_warning = judge_strain(typical_strain(system, solution));
+  if (!result.strain_warning.empty()) progress.warn(result.strain_warning);
+  judge_outside(energy_outside(system, solution, result.elastic_energy), progress);
   if (system.follows() || system.links_follow())
     report_following(solution.stable == true, progress);
   else if (!solution.stable)
@@ -257,7 +260,7 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   state.displacement = element_displacement(system, solution);
   report(system, solution, result);
   result.bonds = system.bonded_parts();
-  judge(system, solution, result.elastic_energy, progress);
+  judge(system, solution, result, progress);
   sum_up_imbalance(result);
   for (const std::string& warning : warnings_of(result)) progress.warn(scene.name + ": " + warning);
   if (options.stress) tell_replaced_columns(body, progress);

@@ -8,9 +8,6 @@
 
 namespace flexel::simulate {
 
-// In the warning that strains are not small, by which a caller knows it.
-constexpr const char* kSmallStrainWarning = "about so much of the answer is left out";
-
 // Whether it is the model of any part, or of all.
 [[nodiscard]] bool asks_for_quadratic(const Scene& scene);
 

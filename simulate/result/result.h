@@ -131,6 +131,7 @@ struct SimulateResult : SolverCounts {
   Vec3 largest_displacement_at = Vec3::Zero();
   double elastic_energy = 0;     // J
   double mass = 0;               // kg
+  std::string strain_warning;    // of model `quadratic`: that strains are not small; "" where they are
   double smallest_jacobian = 1;  // of all cells' mean gradients, and those around elements at centres
   // of the trilinear map at the cells' corners; <= 0: folded there; nothing without cells
   std::optional<double> smallest_corner_jacobian;
