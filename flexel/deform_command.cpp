@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <memory>
 #include <new>
 #include <nlohmann/json.hpp>
 
@@ -44,6 +45,7 @@
 #include "voxelize/memory.h"
 #include "voxelize/report.h"
 #include "voxelize/voxelize.h"
+#include "voxelize/voxelize_box.h"
 
 namespace flexel::commands {
 namespace {
@@ -63,6 +65,7 @@ struct DeformArguments {
   mapping::MapArguments map;
   int threads = 0;
   bool quiet = false, verbose = false, estimate = true, json = false;
+  bool closer = false;  // a closer look at the largest stress
   bool needs_output = true;
   const Surface* part = nullptr;  // in place of the files
 };
@@ -99,6 +102,8 @@ void declare_output(CommandLine& app, DeformArguments& arguments) {
                  "Choose the finest size whose run ends within this time, all in all (\"10s\")")
       .type_name("TIME");
   app.add_flag("!--no-estimate", arguments.estimate, "Leave out the error bars (docs/theory/error-bars.md)");
+  app.add_flag("--refine-stress", arguments.closer,
+               "Look at the largest stress again, on finer cells around it (docs/theory/local-stress.md)");
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
   app.add_flag("--verbose", arguments.verbose, "Say all that each stage found");
 }
@@ -214,6 +219,11 @@ void plan_refinement(Plan& plan) {
   plan.refine.mode = mapping::RefineOptions::Mode::off;
 }
 
+void refuse_closer_look(const DeformArguments& arguments, const Plan& plan) {
+  if (arguments.closer && !simulate::asks_for_quadratic(plan.job.scene))
+    throw InputError("--refine-stress is for model \"quadratic\": add --model quadratic");
+}
+
 Plan make_plan(const DeformArguments& arguments, const CommandLine& app) {
   Plan plan;
   plan.map = map_options(arguments.map);
@@ -223,6 +233,7 @@ Plan make_plan(const DeformArguments& arguments, const CommandLine& app) {
   plan_refinement(plan);
   plan.job = plan_job(arguments.job);
   plan_goal(arguments, app, plan);
+  refuse_closer_look(arguments, plan);
   return plan;
 }
 
@@ -250,8 +261,22 @@ std::vector<mapping::CadAnswer> write_outputs(const DeformArguments& arguments, 
   return answers;
 }
 
-simulate::SimulateOptions simulate_options(const DeformArguments& arguments, const Plan& plan) {
+// The largest stress is looked at closer where that is asked for, or an accuracy. `body`: that the run is given.
+simulate::CutBox cut_box(const DeformArguments& arguments, const Plan& plan, const Body& body) {
+  if (!simulate::asks_for_quadratic(plan.job.scene) || (!arguments.closer && arguments.accuracy.empty()))
+    return {};
+  const auto voxelizer = std::make_shared<std::optional<voxelize::BoxVoxelizer>>();
+  return [voxelizer, &body, heal = plan.job.voxelize.heal](const LatticeBox& box) {
+    if (!*voxelizer) voxelizer->emplace(body.surface, heal);
+    return (**voxelizer)(box);
+  };
+}
+
+simulate::SimulateOptions simulate_options(const DeformArguments& arguments, const Plan& plan,
+                                           const Body& body) {
   simulate::SimulateOptions options;
+  options.cut_box = cut_box(arguments, plan, body);
+  options.must_cut_box = arguments.closer;
   options.threads = arguments.threads;
   options.failed_output = failed_name(plan);
   options.estimate = arguments.estimate;
@@ -482,7 +507,7 @@ class GoalRuns {
     }
     const double processor = processor_seconds();
     Job job = plan_.job;  // anew for each body: an action that throws leaves none out
-    simulate::SimulateOptions asked = simulate_options(arguments_, plan_);
+    simulate::SimulateOptions asked = simulate_options(arguments_, plan_, run.voxels.body);
     if (solved_) asked.failed_output.clear();  // there is a result
     ++tries_;
     try {
@@ -565,8 +590,8 @@ SolvedRun solve(const DeformArguments& arguments, Plan& plan, std::optional<Accu
   }
   voxelize::report(run.voxels, progress);
   add_actions(plan.job, run.voxels.body);
-  run.simulated =
-      simulate::simulate(run.voxels.body, plan.job.scene, simulate_options(arguments, plan), progress);
+  run.simulated = simulate::simulate(run.voxels.body, plan.job.scene,
+                                     simulate_options(arguments, plan, run.voxels.body), progress);
   use_field(run.voxels.body, arguments.map, plan.map);
   return run;
 }

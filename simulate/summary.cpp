@@ -79,6 +79,29 @@ std::string stress_bar_of(const SimulateResult& result) {
                      human_pressure(found->value[0]));
 }
 
+// "looked at closer at 1 place, 1,204 cells in 1.3 s: 25.5 MPa, 27.1 MPa, 27.3 MPa down to cells of 0.6 mm"
+std::string local_stress_line(const SimulateResult& result) {
+  if (!result.no_local_stress.empty())
+    return "the largest stress was not looked at closer: " + result.no_local_stress;
+  if (!result.local_stress) return "";
+  const LocalStress& local = *result.local_stress;
+  std::string line = fmt::format("looked at closer at {} place(s), {} cells in {:.1f} s", local.places,
+                                 human_count(local.cells), local.seconds);
+  if (local.values.empty()) return line + ": the largest stress lies elsewhere";
+  std::vector<std::string> values;
+  for (auto each = local.values.rbegin(); each != local.values.rend(); ++each)
+    values.push_back(human_pressure(*each));
+  return line + fmt::format(": {} down to cells of {}", fmt::join(values, ", "), human_length(local.spacing));
+}
+
+Json local_stress_json(const LocalStress& local) {
+  return {{"values", local.values},
+          {"spacing", local.spacing},
+          {"places", local.places},
+          {"cells", local.cells},
+          {"seconds", local.seconds}};
+}
+
 Json error_bars_json(const ErrorBars& errors) {
   Json json;
   json["cells"] = errors.cells;
@@ -306,6 +329,8 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
     if (!result.stress->beside.empty()) json["largest_von_mises_beside"] = result.stress->beside;
     if (result.stress->thin_walls > 0) json["largest_von_mises_thin_walls"] = result.stress->thin_walls;
     if (result.stress->yield_share) json["largest_von_mises_yield_share"] = *result.stress->yield_share;
+    if (result.local_stress) json["largest_von_mises_local"] = local_stress_json(*result.local_stress);
+    if (!result.no_local_stress.empty()) json["largest_von_mises_local_none"] = result.no_local_stress;
   }
   if (result.modes) json["shapes"] = modes_json(*result.modes);
   json.update(run_json(result));
@@ -337,6 +362,7 @@ std::vector<std::string> summary_lines(const SimulateResult& result) {
                                 human_pressure(result.stress->value), stress_bar_of(result),
                                 result.stress->part, lengths(result.stress->at), share));
   }
+  if (const std::string line = local_stress_line(result); !line.empty()) lines.push_back(line);
   for (const AppliedLoad& load : result.loads)
     lines.push_back(
         fmt::format("load \"{}\": {}{}", load.name, resultant(load.force, load.moment), link_motion(load)));

@@ -7,11 +7,16 @@
 
 namespace flexel {
 struct Body;  // formats/lattice/body.h
-}
+struct LatticeBox;
+}  // namespace flexel
 
 namespace flexel::simulate {
 
 struct Checkpoint;  // simulate/time/checkpoint.h
+
+// The matter of the run's part in a box of a lattice, with the part's whole surface and exact moments (voxelize/voxelize_box.h). Throws
+// InputError.
+using CutBox = std::function<Body(const LatticeBox& box)>;
 
 struct SimulateOptions {
   int threads = 0;            // 0: every core
@@ -38,6 +43,10 @@ struct SimulateOptions {
   // Timed runs: called with each frame's body and time [s], on the thread of the run; the body is the run's own, and
   // another after the call.
   std::function<void(const Body& body, double time)> on_frame = {};
+  // Model `quadratic`: what the largest stress is looked at closer with (docs/theory/local-stress.md); null: it is not. `must_cut_box`:
+  // what cannot be is refused, else left out.
+  CutBox cut_box = {};
+  bool must_cut_box = false;
 };
 
 }  // namespace flexel::simulate
