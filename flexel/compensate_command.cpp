@@ -95,9 +95,12 @@ class Compensation {
     take_inverse_field(field_, body);
     mapping::MapOptions options;
     mapping::MappedPart mapped = map_part(body, options, {}, quiet_);
+    std::vector<mapping::MapOutput> cad;
     for (const Output& output : outputs)
-      if (output.surface && is_cad(*output.surface))
-        write_cad(body, mapped.report, arguments_.map, options, *output.surface, progress_);
+      if (output.surface && is_cad(*output.surface)) cad.push_back(*output.surface);
+    for (const mapping::CadAnswer& answer :
+         write_cad(body, mapped.report, arguments_.map, options, cad, progress_))
+      progress_.say(answer.line);
     if (wanted_.vertices.size() != body.surface.vertices.size()) {
       body.surface = wanted_;
       mapped.result = {};

@@ -38,6 +38,7 @@
 #include "simulate/input/infill.h"
 #include "simulate/quadratic/quadratic_run.h"
 #include "simulate/result/options.h"
+#include "simulate/result/overload.h"
 #include "simulate/scene/strength.h"
 #include "simulate/simulate.h"
 #include "simulate/summary.h"
@@ -245,10 +246,12 @@ std::vector<mapping::CadAnswer> write_outputs(const DeformArguments& arguments, 
     write_parts(mapped.surface(body), mapped.result.displacement, plan.crack.pieces_format,
                 default_unit(body.surface), plan.crack.pieces);
   const auto cad = [](const Plan::Output& output) { return output.surface && is_cad(*output.surface); };
-  std::vector<mapping::CadAnswer> answers;
-  for (const Plan::Output& output : plan.outputs)  // first, for --strict may end the run here
-    if (cad(output))
-      answers.push_back(write_cad(body, mapped.report, arguments.map, plan.map, *output.surface, progress));
+  std::vector<mapping::MapOutput> cad_outputs;
+  for (const Plan::Output& output : plan.outputs)
+    if (cad(output)) cad_outputs.push_back(*output.surface);
+  // first, for --strict may end the run here
+  std::vector<mapping::CadAnswer> answers =
+      write_cad(body, mapped.report, arguments.map, plan.map, cad_outputs, progress);
   for (const Plan::Output& output : plan.outputs)
     if (cad(output) || output.is_page())  // pages come last: they say what the run said
       continue;
@@ -372,6 +375,8 @@ class GoalRuns {
       return size_of(*made_);
     } catch (const InputError& error) {
       if (!model_.take_back(error.what())) throw;
+    } catch (const simulate::OverloadError&) {
+      throw;
     } catch (const DivergedError& error) {
       if (!model_.take_back(error.what())) throw;
     } catch (const TimeoutError&) {
@@ -396,6 +401,7 @@ class GoalRuns {
   // bends may be thin though most of the matter is not.
   SolvedRun surer_of_two(SolvedRun run) {
     constexpr double kRough = 0.2;
+    constexpr double kSideTrial = 0.15;  // of the time, which finer cells need as much
     if (run.given_up || !model_.may_be_other()) return run;
     std::vector<SolvedRun> first;
     first.push_back(std::move(run));
@@ -405,7 +411,7 @@ class GoalRuns {
     const mapping::MapOptions map = plan_.map;
     std::string why_not;
     try {
-      const StopAfter limit(patience(), "--within");
+      const StopAfter limit(patience(kSideTrial, kSideTrial), "--within");
       std::vector<SolvedRun> other;
       const double size = made(std::nullopt).size;
       other.push_back(solve(size, [](std::size_t) { return true; }));
@@ -448,10 +454,10 @@ class GoalRuns {
   }
 
   // s, for the first answer of a model that nobody asked for.
-  [[nodiscard]] double patience() const {
-    constexpr double kShare = 0.3, kUsualShare = 0.45, kUsual = 30;
+  [[nodiscard]] double patience(double share = 0.3, double usual_share = 0.45) const {
+    constexpr double kUsual = 30;  // s, without --within
     const AccuracyGoal& goal = *plan_.goal;
-    return (goal.by_default ? kUsualShare * slowed_by_others(goal.began) : kShare) *
+    return (goal.by_default ? usual_share * slowed_by_others(goal.began) : share) *
            goal.within.value_or(kUsual);
   }
   // No more than --max-elements and --max-memory let pass.

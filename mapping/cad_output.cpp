@@ -107,19 +107,31 @@ std::vector<std::string> faults(const CadWritten& written, const MapReport& foun
   return lines;
 }
 
-std::string line_of(const CadWritten& written, const std::string& title) {
+// Of one file, as it was read again.
+std::string fault_of(const CadWritten& written, const CadFile& file, const std::string& title) {
+  if (file.invalid_again == 0 || !written.invalid.empty()) return "";
+  return fmt::format(
+      "OpenCASCADE's check finds {} of the {} file, read again, not valid: look at it in your CAD "
+      "program, or write a mesh (STL, OBJ, ...)",
+      counted(file.invalid_again, "solid"), title);
+}
+
+std::string line_of(const CadWritten& written, const CadFile& file, const std::string& title) {
   const std::string others =
       written.kept == written.faces
           ? "all as before, moved"
           : fmt::format("{} as before, the others within {} of the deformation{}", written.kept,
                         human_length(written.deviation),
                         written.deviation_face.empty() ? "" : " (" + written.deviation_face + ")");
+  const bool valid = written.invalid.empty() && file.invalid_again == 0;
   return fmt::format("{}: {} of {}, {}; {}", title, counted(written.solids, "solid"),
                      counted(written.faces, "face"), others,
-                     written.invalid.empty() ? "valid, also when read again" : "not valid");
+                     valid ? "valid, also when read again" : "not valid");
 }
 
-std::string json_of(const CadWritten& written, const MapOutput& output) {
+std::string json_of(const CadWritten& written, const CadFile& file, const MapOutput& output) {
+  std::vector<std::string> invalid = written.invalid;
+  if (invalid.empty() && file.invalid_again > 0) invalid.emplace_back("a solid, read again");
   nlohmann::ordered_json json = {{"file", output.path},
                                  {"format", output.format->file->name},
                                  {"solids", written.solids},
@@ -130,8 +142,8 @@ std::string json_of(const CadWritten& written, const MapOutput& output) {
                                  {"deviation_face", written.deviation_face},
                                  {"missed", nlohmann::ordered_json::array()},
                                  {"folded", written.folded},
-                                 {"valid", written.invalid.empty()},
-                                 {"invalid", written.invalid},
+                                 {"valid", invalid.empty()},
+                                 {"invalid", invalid},
                                  {"invalid_before", written.invalid_before},
                                  {"largest_gap", written.gap},
                                  {"volume_before", written.volume_before},
@@ -146,6 +158,46 @@ ChildLimits limits_of(const Body& body) {
   double bytes = 0;
   for (const SurfaceSource& source : body.surface.sources) bytes += static_cast<double>(source.bytes.size());
   return limits_of_child(600 + 1e-3 * bytes, .8 * available_memory());
+}
+
+void refuse_meshes(const Body& body, const MapReport& found, const std::string& title) {
+  for (const SurfaceSource& source : body.surface.sources)
+    if (!is_cad(source) || source.bytes.empty())
+      throw InputError(source.file,
+                       fmt::format("has no CAD faces that {} could hold: write a mesh (STL, OBJ, ...), or "
+                                   "start from a STEP, IGES or BREP file",
+                                   title));
+  if (found.crack.spanning_triangles > 0)
+    throw InputError(fmt::format(
+        "the part broke, and {} keeps its faces whole: write a mesh, with --crack open or cap", title));
+}
+
+// The outputs of one job: their faces are fitted once.
+struct JobOutputs {
+  std::vector<std::size_t> outputs;  // numbers
+  CadWriteJob job;
+  CadWritten written;
+  [[nodiscard]] const CadFile& file_of(const MapOutput& output) const {
+    const auto format = std::find(job.formats.begin(), job.formats.end(), output.format->file->name);
+    return written.files[static_cast<std::size_t>(format - job.formats.begin())];
+  }
+};
+
+// BREP has no unit: of a BREP file that is not in mm it is not of the same numbers as STEP and IGES, which come in mm.
+std::vector<JobOutputs> jobs_of(const std::vector<MapOutput>& outputs, const Body& body) {
+  const bool apart = std::any_of(
+      body.surface.sources.begin(), body.surface.sources.end(),
+      [](const SurfaceSource& source) { return source.format == "brep" && source.unit != kMillimetre; });
+  std::vector<JobOutputs> jobs(2);
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    const std::string format(outputs[i].format->file->name);
+    JobOutputs& job = jobs[apart && format == "brep" ? 1 : 0];
+    job.outputs.push_back(i);
+    if (std::find(job.job.formats.begin(), job.job.formats.end(), format) == job.job.formats.end())
+      job.job.formats.push_back(format);
+  }
+  std::erase_if(jobs, [](const JobOutputs& each) { return each.outputs.empty(); });
+  return jobs;
 }
 
 }  // namespace
@@ -163,38 +215,44 @@ void check_cad_output(const MapArguments& arguments, const CrackOptions& crack, 
     throw InputError("--attributes: STEP, IGES and BREP have no vertices: write .vtu or PLY");
 }
 
-CadAnswer write_cad(const Body& body, const MapReport& found, const MapArguments& arguments,
-                    const MapOptions& options, const MapOutput& output, Progress& progress) {
-  const std::string title(output.format->file->title);
-  for (const SurfaceSource& source : body.surface.sources)
-    if (!is_cad(source) || source.bytes.empty())
-      throw InputError(source.file,
-                       fmt::format("has no CAD faces that {} could hold: write a mesh (STL, OBJ, ...), or "
-                                   "start from a STEP, IGES or BREP file",
-                                   title));
-  if (found.crack.spanning_triangles > 0)
-    throw InputError(fmt::format(
-        "the part broke, and {} keeps its faces whole: write a mesh, with --crack open or cap", title));
-  CadWriteJob job;
-  job.body = body_bytes(body);
-  job.format = output.format->file->name;
-  job.method = name_of(options.method);
-  job.scale = output.scale;
-  job.tolerance = tolerance_of(arguments.tolerance, body);
-  if (output.scale == 1) job.volume = found.quality.volume_after / found.quality.volume_before;
-  job.threads = thread_count();
+std::vector<CadAnswer> write_cad(const Body& body, const MapReport& found, const MapArguments& arguments,
+                                 const MapOptions& options, const std::vector<MapOutput>& outputs,
+                                 Progress& progress) {
+  const auto title = [](const MapOutput& output) { return std::string(output.format->file->title); };
+  if (outputs.empty()) return {};
+  refuse_meshes(body, found, title(outputs.front()));
+  const double scale = outputs.front().scale;
   const std::string where = body.surface.sources.empty() ? "the body" : body.surface.sources.front().file;
-  const CadWritten written =
-      run_job(job, limits_of(body), where, [&](const std::string& line) { progress.warn(line); });
-  const std::vector<std::string> wrong = faults(written, found, output.scale);
+  std::vector<JobOutputs> jobs = jobs_of(outputs, body);
+  std::vector<std::string> wrong;
+  for (JobOutputs& each : jobs) {
+    each.job.body = body_bytes(body);
+    each.job.method = name_of(options.method);
+    each.job.scale = scale;
+    each.job.tolerance = tolerance_of(arguments.tolerance, body);
+    if (scale == 1) each.job.volume = found.quality.volume_after / found.quality.volume_before;
+    each.job.threads = thread_count();
+    each.written =
+        run_job(each.job, limits_of(body), where, [&](const std::string& line) { progress.warn(line); });
+    each.job.body = {};
+    for (const std::string& line : faults(each.written, found, scale)) wrong.push_back(line);
+    for (const std::size_t i : each.outputs)
+      if (std::string line = fault_of(each.written, each.file_of(outputs[i]), title(outputs[i]));
+          !line.empty())
+        wrong.push_back(std::move(line));
+  }
   if (arguments.strict && !wrong.empty()) throw InvalidMappingError(wrong.front());
   for (const std::string& line : wrong) progress.warn(line);
-  OutputFile file(output.path);
-  file.write(written.file.data(), written.file.size());
-  file.commit();
-  CadAnswer answer{line_of(written, title), json_of(written, output)};
-  progress.say(answer.line);
-  return answer;
+  std::vector<CadAnswer> answers(outputs.size());
+  for (const JobOutputs& each : jobs)
+    for (const std::size_t i : each.outputs) {
+      const CadFile& made = each.file_of(outputs[i]);
+      OutputFile file(outputs[i].path);
+      file.write(made.bytes.data(), made.bytes.size());
+      file.commit();
+      answers[i] = {line_of(each.written, made, title(outputs[i])), json_of(each.written, made, outputs[i])};
+    }
+  return answers;
 }
 
 }  // namespace flexel::mapping

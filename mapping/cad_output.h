@@ -1,6 +1,7 @@
 // Writes the part's own CAD file, deformed: exact faces, not triangles.
 #pragma once
 #include <string>
+#include <vector>
 
 #include "base/program/progress.h"
 #include "formats/lattice/body.h"
@@ -21,10 +22,12 @@ struct CadAnswer {
   std::string json;  // an object (docs/guide/deform.md)
 };
 
-// STEP, IGES or BREP of `body`, whose sources hold its CAD files: each face is fitted to the deformation that `options`
-// name, and what was made is measured, checked, read again and told. Throws InputError: a part that is a mesh, or that
-// broke; InvalidMappingError, and nothing is written: a face or solid is not as it should be, with --strict.
-CadAnswer write_cad(const Body& body, const MapReport& found, const MapArguments& arguments,
-                    const MapOptions& options, const MapOutput& output, Progress& progress);
+// STEP, IGES or BREP of `body`, whose sources hold its CAD files, a file for each of `outputs`: each face is fitted to
+// the deformation that `options` name, once for all of them, and what was made is measured, checked, read again and
+// told. Throws InputError: a part that is a mesh, or that broke; InvalidMappingError, and nothing is written: a face or
+// solid is not as it should be, with --strict. Returns (outputs) what there is to say.
+std::vector<CadAnswer> write_cad(const Body& body, const MapReport& found, const MapArguments& arguments,
+                                 const MapOptions& options, const std::vector<MapOutput>& outputs,
+                                 Progress& progress);
 
 }  // namespace flexel::mapping

@@ -307,7 +307,9 @@ class Run {
   void write_part(const Body& body, const MapReport& found, const MapOutput& output,
                   OutputsTogether& outputs) {
     try {
-      write_cad(body, found, arguments_.map, plan_.options, output, progress_);
+      for (const CadAnswer& answer :
+           write_cad(body, found, arguments_.map, plan_.options, {output}, progress_))
+        progress_.say(answer.line);
     } catch (const InvalidMappingError&) {
       outputs.appear();
       print_json(found);

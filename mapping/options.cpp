@@ -39,6 +39,11 @@ std::string pattern_of(const std::string& pieces, const std::string& format) {
   return (std::filesystem::path(path) / ("{part}." + (format.empty() ? "stl" : format))).string();
 }
 
+// Whether write_report() throws the first of its lines.
+bool ends_run(const MapReport& found, const MapArguments& arguments) {
+  return !found.valid() && (arguments.strict || found.not_finite > 0);
+}
+
 }  // namespace
 
 void declare_map_options(CommandLine& app, MapArguments& arguments) {
@@ -155,7 +160,7 @@ RefineOptions refine_options(const MapArguments& arguments, const CommandLine& a
 void say_report(const MapReport& found, const MapArguments& arguments, const MapOptions& options,
                 Progress& progress) {
   const std::vector<std::string> lines = report_lines(found);
-  for (std::size_t i = 0; i < lines.size(); ++i)
+  for (std::size_t i = ends_run(found, arguments) ? 1 : 0; i < lines.size(); ++i)
     if (i == 0 && !found.valid())
       progress.warn(lines[i]);
     else
@@ -166,8 +171,7 @@ void say_report(const MapReport& found, const MapArguments& arguments, const Map
 void write_report(const MapReport& found, const MapArguments& arguments, const MapOptions& options,
                   const std::string& path) {
   if (!path.empty()) write_text(report_json(found, options), path);
-  if (!found.valid() && (arguments.strict || found.not_finite > 0))
-    throw InvalidMappingError(report_lines(found).front());
+  if (ends_run(found, arguments)) throw InvalidMappingError(report_lines(found).front());
 }
 
 }  // namespace flexel::mapping

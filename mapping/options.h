@@ -28,7 +28,8 @@ void use_field(const Body& body, const MapArguments& arguments, MapOptions& opti
 [[nodiscard]] RefineOptions refine_options(const MapArguments& arguments, const CommandLine& app,
                                            const CrackOptions& crack);
 
-// Says the report's lines, the first as a warning where the mapping cannot be used; and its table.
+// Says the report's lines, the first as a warning where the mapping cannot be used, but for one that write_report()
+// will throw; and its table.
 void say_report(const MapReport& found, const MapArguments& arguments, const MapOptions& options,
                 Progress& progress);
 // Writes the report to `path` where there is one. Throws InvalidMappingError after that: the mapping cannot

@@ -18,6 +18,7 @@
 #include <assimp/LogStream.hpp>
 #include <assimp/Logger.hpp>
 #include <cmath>
+#include <set>
 #include <utility>
 
 #include "base/error.h"
@@ -77,6 +78,13 @@ bool has_made_up_root(const std::string& format) {
   return format == "3ds" || format == "ase" || format == "dxf" || format == "dae";
 }
 
+bool has_texture(const aiMaterial* material) {
+  if (material == nullptr) return false;
+  for (int type = aiTextureType_DIFFUSE; type <= aiTextureType_UNKNOWN; ++type)
+    if (material->GetTextureCount(static_cast<aiTextureType>(type)) > 0) return true;
+  return false;
+}
+
 // What a reader before assimp found out of the file.
 struct FileFacts {
   Bytes bytes;  // for assimp, where it gets others than the file's
@@ -92,18 +100,19 @@ class AssimpReader {
   // What the scene shows, in the order of its nodes.
   void show() {
     const bool made_up = has_made_up_root(job_.format);
-    std::vector<Shown> pending = {{scene_.mRootNode, Eigen::Matrix4d::Identity(), ""}};
+    std::vector<Shown> pending = {{scene_.mRootNode, Eigen::Matrix4d::Identity(), "", ""}};
     while (!pending.empty()) {
-      const auto [node, above, name_above] = pending.back();
+      const auto [node, above, name_above, assembly] = pending.back();
       pending.pop_back();
       check_inheritance(*node, above);
       const bool own = node != scene_.mRootNode || !made_up;
       const Eigen::Matrix4d transform =
           own ? Eigen::Matrix4d(above * matrix_of(node->mTransformation)) : above;
       const std::string name = name_of(*node, name_above);
-      if (node->mNumMeshes > 0) add_part(*node, transform, name);
+      if (node->mNumMeshes > 0) add_part(*node, transform, name, assembly);
+      const std::string below = own && node != scene_.mRootNode ? assembly_below(*node, assembly) : assembly;
       for (unsigned i = node->mNumChildren; i > 0; --i)
-        pending.push_back({node->mChildren[i - 1], transform, name});
+        pending.push_back({node->mChildren[i - 1], transform, name, below});
     }
   }
 
@@ -115,7 +124,7 @@ class AssimpReader {
   // What is left out of the file, for one line; empty: nothing.
   [[nodiscard]] std::vector<std::string> left_out() const {
     std::vector<std::string> all;
-    if (textures_) all.emplace_back("textures");
+    if (textures_ || coordinates_) all.emplace_back(textures_ ? "textures" : "texture coordinates");
     if (colors_within_) all.emplace_back("changes of colour within a polygon");
     if (bones_) all.emplace_back("skeletons");
     if (morphs_) all.emplace_back("morph targets");
@@ -125,12 +134,24 @@ class AssimpReader {
   }
 
  private:
-  // A node, and the transform and name of those above it.
+  // A node, and the transform, name and path of those above it.
   struct Shown {
     const aiNode* node;
     Eigen::Matrix4d above;
-    std::string name;
+    std::string name, assembly;
   };
+
+  // The path of what hangs on a node, which is an assembly then; not of one that assimp makes of FBX's pivots.
+  [[nodiscard]] std::string assembly_below(const aiNode& node, const std::string& above) {
+    std::string name = name_of(node, "");
+    if (node.mNumChildren == 0 || name.empty() || name.find("_$AssimpFbx$_") != std::string::npos)
+      return above;
+    std::replace(name.begin(), name.end(), '/', '_');
+    const std::string path = above.empty() ? name : above + "/" + name;
+    std::string own = path;
+    for (int use = 2; !assemblies_.insert(own).second; ++use) own = fmt::format("{}-{}", path, use);
+    return own;
+  }
 
   // FBX can keep a node from being scaled as the one above it is; assimp scales it.
   void check_inheritance(const aiNode& node, const Eigen::Matrix4d& above) const {
@@ -155,18 +176,19 @@ class AssimpReader {
     return own.empty() ? above : own;
   }
 
-  void add_part(const aiNode& node, const Eigen::Matrix4d& transform, const std::string& name) {
+  void add_part(const aiNode& node, const Eigen::Matrix4d& transform, const std::string& name,
+                const std::string& assembly) {
     if (++uses_ > kMostUses) throw InputError(job_.where, "shows more than a million meshes: it is damaged");
     for (unsigned i = 0; i < node.mNumMeshes; ++i)
       if (node.mMeshes[i] < scene_.mNumMeshes) add_mesh(*scene_.mMeshes[node.mMeshes[i]], transform);
-    mesh_.end_part(name);
+    mesh_.end_part(name, assembly);
   }
 
   void add_mesh(const aiMesh& mesh, const Eigen::Matrix4d& transform) {
     const bool mirrored = transform.topLeftCorner<3, 3>().determinant() < 0;
     const aiMaterial* material =
         mesh.mMaterialIndex < scene_.mNumMaterials ? scene_.mMaterials[mesh.mMaterialIndex] : nullptr;
-    textures_ = textures_ || mesh.HasTextureCoords(0);
+    (has_texture(material) ? textures_ : coordinates_) |= mesh.HasTextureCoords(0);
     bones_ = bones_ || mesh.HasBones();
     morphs_ = morphs_ || mesh.mNumAnimMeshes > 0;
     mesh_.begin_group(material == nullptr ? "" : material->GetName().C_Str());
@@ -226,7 +248,8 @@ class AssimpReader {
   const MeshReadJob& job_;
   MeshBuilder mesh_;
   std::size_t uses_ = 0, shown_ = 0, lines_ = 0;
-  bool colors_within_ = false, textures_ = false, bones_ = false, morphs_ = false;
+  std::set<std::string> assemblies_;  // their paths
+  bool colors_within_ = false, textures_ = false, coordinates_ = false, bones_ = false, morphs_ = false;
 };
 
 // What assimp says while it reads, but for what is of looks and movements: it may mean that a shape is missing.

@@ -37,7 +37,7 @@ void MeshBuilder::begin_group(const std::string& name) {
   mesh_.group_names.push_back(name);
 }
 
-void MeshBuilder::end_part(const std::string& name) {
+void MeshBuilder::end_part(const std::string& name, const std::string& assembly) {
   if (corners_.empty()) return;
   const std::vector<std::uint32_t> first = first_equal(corners_.size(), [&](std::size_t i) {
     return position_key(corners_[i].x(), corners_[i].y(), corners_[i].z());
@@ -52,11 +52,14 @@ void MeshBuilder::end_part(const std::string& name) {
   }
   corners_.clear();
   mesh_.part_names.push_back(name);
+  mesh_.part_assemblies.push_back(assembly);
+  assembled_ = assembled_ || !assembly.empty();
 }
 
 ForeignMesh MeshBuilder::finish(double unit) {
   if (mesh_.polygon_vertices.empty()) throw InputError(where_, "shows no polygons: nothing to work on");
   if (!colored_) mesh_.polygon_colors.clear();
+  if (!assembled_) mesh_.part_assemblies.clear();
   mesh_.unit = unit;
   return std::move(mesh_);
 }

@@ -21,8 +21,8 @@ class MeshBuilder {
   void end_polygon(std::optional<Rgba> color);
   // Polygons from here on belong together within their part: a material's, say.
   void begin_group(const std::string& name);
-  // All since the last part; nothing happens where there is no polygon.
-  void end_part(const std::string& name);
+  // All since the last part; nothing happens where there is no polygon. `assembly`: as SurfacePart::assembly.
+  void end_part(const std::string& name, const std::string& assembly = "");
   // Throws InputError: there is no polygon.
   [[nodiscard]] ForeignMesh finish(double unit);
 
@@ -31,7 +31,7 @@ class MeshBuilder {
   std::string where_;
   ForeignMesh mesh_;
   std::vector<Vec3> corners_;  // of the part
-  bool colored_ = false;
+  bool colored_ = false, assembled_ = false;
 };
 
 }  // namespace flexel::meshes

@@ -211,7 +211,9 @@ py::tuple map_body(const BodyObject& given, const std::vector<std::string>& word
     say_report(mapped.report, arguments, options, progress);
     write_report(mapped.report, arguments, options, arguments.report);
     if (output && is_cad(*output))
-      write_cad(body, mapped.report, arguments, options, *output, progress);
+      for (const mapping::CadAnswer& answer :
+           write_cad(body, mapped.report, arguments, options, {*output}, progress))
+        progress.say(answer.line);
     else if (output)
       write_mapped(mapped.surface(body), body, mapped.result, *output);
     const std::string report = report_json(mapped.report, options);

@@ -1,6 +1,7 @@
 // The run: materials, loose crumbs, effects, the check for free motions, equilibrium, what is reported.
 #include "simulate/simulate.h"
 #include "simulate/result/options.h"
+#include "simulate/result/overload.h"
 #include "simulate/result/result.h"
 
 #include <fmt/format.h>
@@ -162,6 +163,8 @@ EquilibriumResult Run::solve(Mechanics& mechanics) {
     if (body_.cell_count() >= kLeastCellsToCoarsen)
       start = [&](Progress& stretch) { return coarse_equilibrium(stretch); };
     return find_equilibrium(mechanics, state_, scene_.run, progress_, start);
+  } catch (const OverloadError& error) {
+    throw OverloadError(error.what() + save_failed(mechanics));
   } catch (const DivergedError& error) {
     throw DivergedError(error.what() + save_failed(mechanics));
   } catch (const TimeoutError& error) {

@@ -22,6 +22,8 @@ import subprocess
 import sys
 import tempfile
 
+from kept import Kept
+
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 
@@ -31,26 +33,6 @@ def command(*words, accept=(0,)):
     if done.returncode not in accept:
         raise RuntimeError(f"{' '.join(map(str, words))}: {(done.stderr.strip().splitlines() or ['no message'])[-1]}")
     return done.stdout
-
-
-class Kept:
-    """What is done already, in a folder that a later run goes on from; without one nothing is kept."""
-
-    def __init__(self, folder):
-        self.folder = folder
-        if folder:
-            folder.mkdir(parents=True, exist_ok=True)
-
-    def __call__(self, name, make):
-        path = self.folder and self.folder / (re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") + ".json")
-        if path and path.exists():
-            return json.loads(path.read_text(encoding="utf-8"))
-        result = make()
-        if path:
-            part = path.with_name(path.name + ".part")
-            part.write_text(json.dumps(result), encoding="utf-8")
-            part.replace(path)
-        return result
 
 
 # The lattice as a material

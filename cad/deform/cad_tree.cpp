@@ -276,6 +276,22 @@ void check_scales(const TopoDS_Shape& shape, const std::string& where) {
           where, "has shapes in scaled places, which cannot be written again: write a mesh (STL, OBJ, ...)");
 }
 
+// What the labels say of a solid or face of a file without a tree.
+StyledShape styled_by(const ShapeLabels& labels, const TopoDS_Shape& shape, const std::string& name) {
+  StyledShape styled{shape, TCollection_ExtendedString(name.c_str(), Standard_True), {}};
+  if (const std::optional<ShapeColor> color = labels.color(shape))
+    styled.style.colors[1] = Quantity_ColorRGBA(  // of surfaces (kColorTypes)
+        Quantity_Color((*color)[0], (*color)[1], (*color)[2], Quantity_TOC_sRGB));
+  if (labels.layer)
+    if (const std::string layer = labels.layer(shape); !layer.empty())
+      styled.style.layers.emplace_back(layer.c_str());
+  return styled;
+}
+
+bool says_something(const StyledShape& styled) {
+  return !styled.name.IsEmpty() || styled.style.colors[1] || !styled.style.layers.empty();
+}
+
 TopoDS_Shape read_single(const CadReadJob& job, bool in_mm, CadTree& tree) {
   CadShape read = read_shape(job, {});
   check_scales(*read.shape, job.where);
@@ -287,12 +303,18 @@ TopoDS_Shape read_single(const CadReadJob& job, bool in_mm, CadTree& tree) {
   }
   CadNode node;
   node.shape = *read.shape;
-  for (TopExp_Explorer each(node.shape, TopAbs_SOLID); each.More(); each.Next())
-    if (const std::string name = read.labels.solid_name(each.Current()); !name.empty())
-      node.styled.push_back({each.Current(), TCollection_ExtendedString(name.c_str(), Standard_True), {}});
-  for (TopExp_Explorer each(node.shape, TopAbs_FACE); each.More(); each.Next())
-    if (const std::string name = read.labels.face_name(each.Current()); !name.empty())
-      node.styled.push_back({each.Current(), TCollection_ExtendedString(name.c_str(), Standard_True), {}});
+  const auto add_styled = [&](TopAbs_ShapeEnum kind, const auto& name) {
+    for (TopExp_Explorer each(node.shape, kind); each.More(); each.Next())
+      if (const StyledShape styled = styled_by(read.labels, each.Current(), name(each.Current()));
+          styled.shape.IsSame(node.shape)) {
+        node.name = styled.name;
+        node.style = styled.style;
+      } else if (says_something(styled)) {
+        node.styled.push_back(styled);
+      }
+  };
+  add_styled(TopAbs_SOLID, read.labels.solid_name);
+  add_styled(TopAbs_FACE, read.labels.face_name);
   tree.unit = read.unit;
   tree.roots.push_back(std::move(node));
   return *read.shape;

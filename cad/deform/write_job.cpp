@@ -306,17 +306,19 @@ void deform_nodes(Work& work, std::vector<CadNode>& nodes, const TopLoc_Location
 }
 
 // What of a source does not come out.
-void tell_losses(const CadTree& tree, const SurfaceSource& source, const std::string& format,
+void tell_losses(const CadTree& tree, const SurfaceSource& source, const std::vector<std::string>& formats,
                  const Warn& warn) {
   if (source.format == "step")
     if (const std::string pmi = pmi_of(source.bytes); !pmi.empty())
       warn(fmt::format("{} of {} do not come along: they are of the shape as it was", pmi, source.file));
-  if (const std::string lost = no_room_for(tree, format); !lost.empty())
-    warn(fmt::format("{} of {} do not come along: {} has no room for them; STEP has", lost, source.file,
-                     format == "brep" ? "BREP" : "IGES"));
+  for (const std::string& format : formats)
+    if (const std::string lost = no_room_for(tree, format); !lost.empty())
+      warn(fmt::format("{} of {} do not come along: {} has no room for them; STEP has", lost, source.file,
+                       format == "brep" ? "BREP" : "IGES"));
 }
 
-CadTree deformed_source(Work& work, std::uint32_t index, const std::string& format, const Warn& warn) {
+CadTree deformed_source(Work& work, std::uint32_t index, const std::vector<std::string>& formats,
+                        const Warn& warn) {
   const SurfaceSource& source = work.body.surface.sources[index];
   if (source.bytes.empty() || (source.format != "step" && source.format != "iges" && source.format != "brep"))
     throw InputError(source.file,
@@ -328,7 +330,9 @@ CadTree deformed_source(Work& work, std::uint32_t index, const std::string& form
   job.bytes = source.bytes;
   job.where = job.file = source.file;
   job.unit = source.unit;
-  CadTree tree = read_tree(job, format != "brep");
+  const bool has_unit =
+      std::any_of(formats.begin(), formats.end(), [](const std::string& format) { return format != "brep"; });
+  CadTree tree = read_tree(job, has_unit);
   std::vector<std::uint32_t> part_of_solid;
   for (std::uint32_t part = 0; part < work.body.parts.size(); ++part)
     if (work.body.surface.part_source[part] == index) part_of_solid.push_back(part);
@@ -336,16 +340,16 @@ CadTree deformed_source(Work& work, std::uint32_t index, const std::string& form
     throw InputError(source.file,
                      fmt::format("holds {} solids where the body has {} parts of it: write a mesh instead",
                                  tree.solids, part_of_solid.size()));
-  tell_losses(tree, source, format, warn);
+  tell_losses(tree, source, formats, warn);
   deform_nodes(work, tree.roots, TopLoc_Location(), tree.unit, part_of_solid, source.file);
   return tree;
 }
 
 // What was written has to be what was meant: as many solids, valid ones.
-void read_again(CadWritten& written, const std::string& format, double unit) {
+void read_again(const CadWritten& written, CadFile& file, const std::string& format, double unit) {
   CadReadJob job;
   job.format = format;
-  job.bytes = written.file;
+  job.bytes = file.bytes;
   job.where = job.file = "the file written";
   job.unit = unit;
   const CadShape back = read_shape(job, {});
@@ -363,9 +367,7 @@ void read_again(CadWritten& written, const std::string& format, double unit) {
   const auto is_right = [&](double volume) {
     return std::abs(volume - written.volume) <= 5e-3 * written.volume;
   };
-  for (const TopoDS_Shape& solid : solids)
-    if (!BRepCheck_Analyzer(solid).IsValid() && written.invalid.empty())
-      written.invalid.emplace_back("a solid, read again");
+  for (const TopoDS_Shape& solid : solids) file.invalid_again += !BRepCheck_Analyzer(solid).IsValid();
   if (is_right(sum(quick_volume))) return;
   if (const double volume = sum(mesh_volume); !is_right(volume))
     throw InputError(
@@ -379,7 +381,7 @@ CadWritten write_deformed(const CadWriteJob& job, const Warn& warn) {
   Work work(read_body(job.body, "the body"), job);
   std::vector<CadTree> trees;
   for (std::uint32_t s = 0; s < work.body.surface.sources.size(); ++s)
-    trees.push_back(deformed_source(work, s, job.format, warn));
+    trees.push_back(deformed_source(work, s, job.formats, warn));
   if (trees.empty()) throw InputError("the body carries no surface: its part is not known");
   for (const CadTree& tree : trees)
     if (tree.unit != trees.front().unit)
@@ -387,8 +389,11 @@ CadWritten write_deformed(const CadWriteJob& job, const Warn& warn) {
   if (work.loose_faces > 0)
     warn(fmt::format("{} in no solid {} along with the part that is nearest",
                      counted(work.loose_faces, "face"), work.loose_faces == 1 ? "goes" : "go"));
-  work.written.file = write_tree(trees, job.format);
-  read_again(work.written, job.format, trees.front().unit);
+  for (const std::string& format : job.formats) {
+    CadFile file{write_tree(trees, format)};
+    read_again(work.written, file, format, trees.front().unit);
+    work.written.files.push_back(std::move(file));
+  }
   return std::move(work.written);
 }
 

@@ -82,38 +82,14 @@ class ErrorGauge {
 
   // Along the lines of nodes, thinned where there are many.
   [[nodiscard]] SpanErrors on_lines() const {
-    constexpr std::size_t kMostLines = 60;
-    constexpr int kPoints = kDegree + 1;  // a span
-    const std::vector<double> nodes_u = u_.greville(), nodes_v = v_.greville();
-    const std::size_t every_u = 1 + nodes_u.size() / kMostLines, every_v = 1 + nodes_v.size() / kMostLines;
     const double du = (u_.at.back() - u_.at.front()) / static_cast<double>(u_.spans()),
                  dv = (v_.at.back() - v_.at.front()) / static_cast<double>(v_.spans());
-    SpanErrors errors = none();
-    // All points of a span in a row: OpenCASCADE keeps the polynomial of the last one.
-    const auto on_span = [&](double begin, double end, const auto& counts, const auto& error_at) {
-      double largest = 0;
-      for (int q = 0; q < kPoints; ++q)
-        if (const double at = begin + (end - begin) * (q + 0.5) / kPoints; counts(at))
-          largest = std::max(largest, error_at(at));
-      return largest;
-    };
-    for (std::size_t s = 0; s < u_.spans(); ++s)
-      for (std::size_t j = 0; j < nodes_v.size(); j += every_v)
-        errors.u[s] =
-            std::max(errors.u[s],
-                     on_span(
-                         u_.at[s], u_.at[s + 1],
-                         [&](double u) { return map_.counts(u, nodes_v[j], u_.at[s + 1] - u_.at[s], dv); },
-                         [&](double u) { return error(u, nodes_v[j]); }));
-    for (std::size_t s = 0; s < v_.spans(); ++s)
-      for (std::size_t i = 0; i < nodes_u.size(); i += every_u)
-        errors.v[s] =
-            std::max(errors.v[s],
-                     on_span(
-                         v_.at[s], v_.at[s + 1],
-                         [&](double v) { return map_.counts(nodes_u[i], v, du, v_.at[s + 1] - v_.at[s]); },
-                         [&](double v) { return error(nodes_u[i], v); }));
-    return errors;
+    return {along_lines(
+                u_, v_, [&](double u, double v, double width) { return map_.counts(u, v, width, dv); },
+                [&](double u, double v) { return error(u, v); }),
+            along_lines(
+                v_, u_, [&](double v, double u, double width) { return map_.counts(u, v, du, width); },
+                [&](double v, double u) { return error(u, v); })};
   }
 
   // At four points of every rectangle of knots.
@@ -134,6 +110,25 @@ class ErrorGauge {
   }
 
  private:
+  // Of each span of `knots`, on the lines at nodes of the other direction; counts(at, line, width of the span).
+  template <class Counts, class Error>
+  [[nodiscard]] static std::vector<double> along_lines(const Knots& knots, const Knots& across,
+                                                       const Counts& counts, const Error& error_at) {
+    constexpr std::size_t kMostLines = 60;
+    constexpr int kPoints = kDegree + 1;  // a span
+    const std::vector<double> lines = across.greville();
+    const std::size_t every = 1 + lines.size() / kMostLines;
+    std::vector<double> errors(knots.spans());
+    for (std::size_t s = 0; s < knots.spans(); ++s) {
+      const double begin = knots.at[s], width = knots.at[s + 1] - knots.at[s];
+      for (std::size_t line = 0; line < lines.size(); line += every)
+        // All points of a span in a row: OpenCASCADE keeps the polynomial of the last one.
+        for (int q = 0; q < kPoints; ++q)
+          if (const double at = begin + width * (q + 0.5) / kPoints; counts(at, lines[line], width))
+            errors[s] = std::max(errors[s], error_at(at, lines[line]));
+    }
+    return errors;
+  }
   [[nodiscard]] SpanErrors none() const {
     return {std::vector<double>(u_.spans()), std::vector<double>(v_.spans())};
   }

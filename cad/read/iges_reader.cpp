@@ -1,17 +1,21 @@
 // IGES through OpenCASCADE. Most files hold no solids but the trimmed surfaces of one; those are sewn along
 // their edges first, at the smallest of a few tolerances that leaves no edge free, and the closed shells
-// are taken as solids. Names are those of the entities.
+// are taken as solids. Names, colours and levels are those of the entities.
 #include <fmt/format.h>
 
 #include <BRepBndLib.hxx>
 #include <BRepBuilderAPI_Sewing.hxx>
 #include <Bnd_Box.hxx>
+#include <IGESCAFControl.hxx>
 #include <IGESControl_Controller.hxx>
 #include <IGESControl_Reader.hxx>
+#include <IGESData_ColorEntity.hxx>
 #include <IGESData_IGESEntity.hxx>
+#include <IGESGraph_Color.hxx>
 #include <Interface_Static.hxx>
 #include <Message.hxx>
 #include <Message_Messenger.hxx>
+#include <Quantity_Color.hxx>
 #include <TCollection_HAsciiString.hxx>
 #include <TopExp_Explorer.hxx>
 #include <TopoDS_Shape.hxx>
@@ -19,6 +23,7 @@
 #include <Transfer_TransientProcess.hxx>
 #include <XSControl_TransferReader.hxx>
 #include <XSControl_WorkSession.hxx>
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -44,18 +49,43 @@ void check_iges_complete(const CadReadJob& job) {
     throw InputError(job.where, "is cut off: an IGES file ends with a line that has a T in column 73");
 }
 
-using Names = std::map<const void*, std::string>;  // by the TShape
+// What an entity says of its shape.
+struct Look {
+  std::string name, layer;  // the layer is the number of the level; "": none
+  std::optional<ShapeColor> color;
+};
+using Looks = std::map<const void*, Look>;  // by the TShape
 
-Names names_in(const IGESControl_Reader& reader) {
-  Names names;
+std::optional<ShapeColor> color_of(const IGESData_IGESEntity& entity) {
+  ShapeColor color{};
+  if (entity.DefColor() == IGESData_DefReference) {
+    const Handle(IGESGraph_Color) own = Handle(IGESGraph_Color)::DownCast(entity.Color());
+    if (own.IsNull()) return std::nullopt;
+    own->RGBIntensity(color[0], color[1], color[2]);
+    for (double& value : color) value = std::isfinite(value) ? std::clamp(value / 100, 0.0, 1.0) : 1;
+    return color;
+  }
+  if (entity.RankColor() <= 0) return std::nullopt;
+  IGESCAFControl::DecodeColor(entity.RankColor()).Values(color[0], color[1], color[2], Quantity_TOC_sRGB);
+  return color;
+}
+
+Looks looks_in(const IGESControl_Reader& reader) {
+  Looks looks;
   const Handle(Transfer_TransientProcess) process = reader.WS()->TransferReader()->TransientProcess();
   for (Standard_Integer i = 1; i <= process->NbMapped(); ++i) {
     const Handle(IGESData_IGESEntity) entity = Handle(IGESData_IGESEntity)::DownCast(process->Mapped(i));
-    if (entity.IsNull() || !entity->HasName() || entity->NameValue().IsNull()) continue;
+    if (entity.IsNull()) continue;
+    Look look{"", "", color_of(*entity)};
+    if (entity->HasName() && !entity->NameValue().IsNull())
+      look.name = clean_name(entity->NameValue()->ToCString());
+    if (entity->DefLevel() == IGESData_DefOne && entity->Level() > 0)
+      look.layer = fmt::format("{}", entity->Level());
+    if (look.name.empty() && look.layer.empty() && !look.color) continue;
     const TopoDS_Shape shape = TransferBRep::ShapeResult(process, entity);
-    if (!shape.IsNull()) names.emplace(shape.TShape().get(), clean_name(entity->NameValue()->ToCString()));
+    if (!shape.IsNull()) looks.emplace(shape.TShape().get(), look);
   }
-  return names;
+  return looks;
 }
 
 std::size_t count(const TopoDS_Shape& shape, TopAbs_ShapeEnum kind) {
@@ -64,8 +94,8 @@ std::size_t count(const TopoDS_Shape& shape, TopAbs_ShapeEnum kind) {
   return found;
 }
 
-// The faces joined to shells, under the names of the faces that they came from.
-TopoDS_Shape sewn(const TopoDS_Shape& shape, Names& names) {
+// The faces joined to shells, with the looks of the faces that they came from.
+TopoDS_Shape sewn(const TopoDS_Shape& shape, Looks& looks) {
   Bnd_Box box;
   BRepBndLib::Add(shape, box, Standard_False);
   const double diagonal = box.IsVoid() ? 0 : std::sqrt(box.SquareExtent());
@@ -77,9 +107,9 @@ TopoDS_Shape sewn(const TopoDS_Shape& shape, Names& names) {
     result = sewing.SewedShape();
     if (sewing.NbFreeEdges() > 0 && share < 1e-4) continue;
     for (TopExp_Explorer face(shape, TopAbs_FACE); face.More(); face.Next()) {
-      const auto name = names.find(face.Current().TShape().get());
-      if (name != names.end() && sewing.IsModifiedSubShape(face.Current()))
-        names.emplace(sewing.ModifiedSubShape(face.Current()).TShape().get(), name->second);
+      const auto look = looks.find(face.Current().TShape().get());
+      if (look != looks.end() && sewing.IsModifiedSubShape(face.Current()))
+        looks.emplace(sewing.ModifiedSubShape(face.Current()).TShape().get(), look->second);
     }
     break;
   }
@@ -97,20 +127,22 @@ CadShape read_entities(const std::string& path, const CadReadJob& job) {
   reader.TransferRoots();
   TopoDS_Shape shape = reader.OneShape();
   if (shape.IsNull()) throw InputError(job.where, "holds no shape");
-  Names names = names_in(reader);
+  const auto looks = std::make_shared<Looks>(looks_in(reader));
   if (count(shape, TopAbs_SOLID) == 0) {
     if (count(shape, TopAbs_FACE) == 0)
       throw InputError(job.where, "holds curves or points but no faces: export the part as a solid");
-    shape = sewn(shape, names);
+    shape = sewn(shape, *looks);
   }
-  const auto name = [names](const TopoDS_Shape& item) {
-    const auto found = names.find(item.TShape().get());
-    return found == names.end() ? std::string() : found->second;
+  const auto look = [looks](const TopoDS_Shape& item) {
+    const auto found = looks->find(item.TShape().get());
+    return found == looks->end() ? Look() : found->second;
   };
+  const auto name = [look](const TopoDS_Shape& item) { return look(item).name; };
   return {std::make_shared<TopoDS_Shape>(shape),
           kMillimetre,
           {name, name, [](const TopoDS_Shape&) { return std::string(); },
-           [](const TopoDS_Shape&) { return std::nullopt; }}};
+           [look](const TopoDS_Shape& item) { return look(item).color; },
+           [look](const TopoDS_Shape& item) { return look(item).layer; }}};
 }
 
 }  // namespace

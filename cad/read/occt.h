@@ -20,6 +20,8 @@ struct ShapeLabels {
   std::function<std::string(const TopoDS_Shape& face)> face_name;
   std::function<std::string(const TopoDS_Shape& compound)> assembly_name;  // of a product's shape, or ""
   std::function<std::optional<ShapeColor>(const TopoDS_Shape& solid_or_face)> color;
+  std::function<std::string(const TopoDS_Shape& solid_or_face)> layer =
+      {};  // of IGES: STEP's are read with its tree
 };
 
 // A file's shape.

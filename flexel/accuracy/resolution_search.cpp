@@ -17,6 +17,7 @@
 #include "base/units.h"
 #include "flexel/accuracy/run_error.h"
 #include "flexel/study/predict.h"
+#include "simulate/result/overload.h"
 #include "voxelize/memory.h"
 
 namespace flexel::commands {
@@ -113,6 +114,8 @@ class Search {
               fmt::format("a first run took too long, and one of fewer cells is refused: {}; {}",
                           error.what(), longer()));
         fail(size, error.what(), failures++);
+      } catch (const simulate::OverloadError&) {
+        throw;
       } catch (const DivergedError& error) {
         fail(size, error.what(), failures++);
       }

@@ -1,9 +1,9 @@
-// The rotation is the one nearest to the covariance of where points are and where they were (Kabsch 1976).
+// By points that move (base/math/rigid_fit.h).
 #include "flexel/clay/rigid_fit.h"
 
 #include <Eigen/Geometry>
 
-#include "base/math/dense.h"
+#include "base/math/rigid_fit.h"
 
 namespace flexel::clay {
 
@@ -14,25 +14,14 @@ Vec3 mean_rest(const std::vector<MovedPoint>& points) {
 }
 
 ToolPose rigid_fit(const std::vector<MovedPoint>& points) {
-  ToolPose pose;
-  if (points.empty()) return pose;
-  const Vec3 middle = mean_rest(points);
-  for (const MovedPoint& point : points) pose.displacement += point.displacement;
-  pose.displacement /= static_cast<double>(points.size());
-  Mat3 covariance = Mat3::Zero();
-  bool moved = false;
+  std::vector<Vec3> rest, displacement;
   for (const MovedPoint& point : points) {
-    const Vec3 arm = point.rest - middle;
-    const Vec3 bent = point.displacement - pose.displacement;
-    moved = moved || bent.squaredNorm() > 1e-24 * arm.squaredNorm();
-    covariance += (arm + bent) * arm.transpose();
+    rest.push_back(point.rest);
+    displacement.push_back(point.displacement);
   }
-  if (!moved) return pose;
-  const NearestRotation nearest = nearest_rotation(covariance);
-  if (!(nearest.values[1] > 1e-9 * nearest.values[0])) return pose;
-  const Eigen::AngleAxisd turn(nearest.rotation);
-  pose.turn = turn.angle() * turn.axis();
-  return pose;
+  const RigidFit fit = flexel::rigid_fit(rest, displacement);
+  const Eigen::AngleAxisd turn(fit.rotation);
+  return {fit.displacement, turn.angle() * turn.axis()};
 }
 
 }  // namespace flexel::clay

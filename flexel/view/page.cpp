@@ -110,10 +110,13 @@ std::map<std::string, double> largest_values(const std::vector<ViewFile>& files)
       double& length = largest["displacement"];
       for (const auto& state : drawn->displacement)
         for (const Vec3& u : state) length = std::max(length, u.norm());
-      for (const Field& field : drawn->fields)
+      for (const Field& field : drawn->fields) {
+        double most = -1;  // no value is finite
         for (const auto& state : field.values)
           for (const double value : state)
-            if (std::isfinite(value)) largest[field.name] = std::max(largest[field.name], std::abs(value));
+            if (std::isfinite(value)) most = std::max(most, std::abs(value));
+        if (most >= 0) largest[field.name] = std::max(largest[field.name], most);
+      }
       largest["/size"] = std::max(largest["/size"], bounding_box(drawn->shape.rest).size().maxCoeff());
     }
   return largest;

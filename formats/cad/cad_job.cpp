@@ -14,7 +14,7 @@ static void visit(Archive& archive, CadReadJob& job) {
 
 template <class Archive>
 static void visit(Archive& archive, CadWriteJob& job) {
-  visit_all(archive, job.body, job.format, job.method, job.scale, job.tolerance, job.volume, job.threads);
+  visit_all(archive, job.body, job.formats, job.method, job.scale, job.tolerance, job.volume, job.threads);
 }
 
 template <class Archive>
@@ -29,8 +29,13 @@ static void visit(Archive& archive, CadFace& face) {
 }
 
 template <class Archive>
+static void visit(Archive& archive, CadFile& file) {
+  visit_all(archive, file.bytes, file.invalid_again);
+}
+
+template <class Archive>
 static void visit(Archive& archive, CadWritten& written) {
-  visit_all(archive, written.file, written.solids, written.faces, written.kept, written.tolerance,
+  visit_all(archive, written.files, written.solids, written.faces, written.kept, written.tolerance,
             written.deviation, written.deviation_face, written.missed, written.folded, written.invalid,
             written.invalid_before, written.gap, written.volume, written.volume_before);
 }
@@ -109,7 +114,10 @@ CadWritten run_job(const CadWriteJob& job, const ChildLimits& limits, const std:
   const Bytes answer = run(pack(job), limits, where,
                            {"deform it", "its surfaces cannot be deformed", "its surfaces are too much",
                             "a larger --tolerance takes less, or write a mesh (STL, OBJ, ...)"});
-  return result_of(unpack_written(answer, where), where, warn);
+  CadWritten written = result_of(unpack_written(answer, where), where, warn);
+  if (written.files.size() != job.formats.size())
+    throw InputError(where, "is damaged: OpenCASCADE makes nothing sound of it");
+  return written;
 }
 
 }  // namespace flexel

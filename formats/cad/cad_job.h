@@ -37,8 +37,9 @@ struct CadMesh {
 
 // Write the CAD files of a body, deformed as it is.
 struct CadWriteJob {
-  Bytes body;            // a body file; its sources hold the CAD files
-  std::string format;    // to write
+  Bytes body;  // a body file; its sources hold the CAD files
+  std::vector<std::string>
+      formats;  // to write, each once. BREP, which has no unit: in that of the source where it comes alone, else in mm
   std::string method;    // of the mapping
   double scale = 1;      // of the displacements
   double tolerance = 0;  // m, that surfaces may miss the deformation by
@@ -53,8 +54,15 @@ struct CadFace {
   double deviation = 0;  // m
 };
 
+// One of the files that a job asks for.
+struct CadFile {
+  Bytes bytes;
+  std::uint64_t invalid_again =
+      0;  // solids that OpenCASCADE's check finds invalid when the file is read again
+};
+
 struct CadWritten {
-  Bytes file;
+  std::vector<CadFile> files;  // in the order of the job's formats
   std::uint64_t solids = 0, faces = 0;
   std::uint64_t kept = 0;           // faces that are planes, cylinders ... as before
   double tolerance = 0;             // m

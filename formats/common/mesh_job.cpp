@@ -42,7 +42,7 @@ static void visit(Archive& archive, VdbFile& file) {
 template <class Archive>
 static void visit(Archive& archive, ForeignMesh& mesh) {
   visit_all(archive, mesh.unit, mesh.vertices, mesh.polygon_offsets, mesh.polygon_vertices, mesh.polygon_part,
-            mesh.polygon_group, mesh.polygon_colors, mesh.part_names, mesh.group_names);
+            mesh.polygon_group, mesh.polygon_colors, mesh.part_names, mesh.group_names, mesh.part_assemblies);
 }
 
 Bytes pack(const MeshReadJob& job) {
@@ -98,6 +98,7 @@ JobAnswer<ForeignMesh> unpack_foreign_mesh(std::span<const std::byte> bytes, con
                mesh.polygon_group.size() == polygons &&
                (mesh.polygon_colors.empty() || mesh.polygon_colors.size() == 4 * polygons) &&
                below(mesh.polygon_part, mesh.part_names.size()) &&
+               (mesh.part_assemblies.empty() || mesh.part_assemblies.size() == mesh.part_names.size()) &&
                below(mesh.polygon_group, mesh.group_names.size()) &&
                below(mesh.polygon_vertices, mesh.vertices.size()) && mesh.polygon_offsets[0] == 0 &&
                mesh.polygon_offsets.back() == mesh.polygon_vertices.size() && mesh.unit >= 0;
@@ -117,7 +118,10 @@ Surface read_foreign(ImportInput& input, const ImportOptions& options, const Fil
   const Bytes answer =
       run_job({"flexel-meshes", library, library}, pack(job), mesh_limits(input), input.where, words);
   input.bytes = std::move(job.bytes);
-  ForeignMesh mesh = result_of(unpack_foreign_mesh(answer, input.where), input.where, options.warn);
+  const auto warn = [&](const std::string& line) {
+    if (options.warn) options.warn(input.where + ": " + line);
+  };
+  ForeignMesh mesh = result_of(unpack_foreign_mesh(answer, input.where), input.where, warn);
   if (mesh.unit > 0 && options.unit)
     throw InputError(input.where,
                      fmt::format("the {} file carries its own unit: leave out --unit", format.title));
@@ -132,6 +136,8 @@ Surface read_foreign(ImportInput& input, const ImportOptions& options, const Fil
   surface.polygon_offsets = std::move(mesh.polygon_offsets);
   surface.polygon_vertices = std::move(mesh.polygon_vertices);
   for (const std::string& part : mesh.part_names) surface.parts.push_back({clean_name(part)});
+  for (std::size_t p = 0; p < mesh.part_assemblies.size(); ++p)
+    surface.parts[p].assembly = clean_name(mesh.part_assemblies[p]);
   for (std::string& group : mesh.group_names) group = clean_name(group);
   if (!mesh.polygon_colors.empty())
     surface.polygon_columns[kColorColumn] = {4, std::move(mesh.polygon_colors)};

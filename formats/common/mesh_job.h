@@ -41,6 +41,7 @@ struct ForeignMesh {
   std::vector<std::uint32_t> polygon_part, polygon_group;        // (polygons) a group is of one part
   std::vector<double> polygon_colors;                            // (polygons x 4) or empty
   std::vector<std::string> part_names, group_names;              // "" where the file has none
+  std::vector<std::string> part_assemblies;  // (parts) as SurfacePart::assembly; empty: the file has none
 };
 
 [[nodiscard]] Bytes pack(const MeshReadJob& job);

@@ -1,9 +1,10 @@
 // Longest-edge bisection (M.-C. Rivara, "Algorithms for refining triangular grids suitable for adaptive and
-// multigrid techniques", 1984), the longest edge of the whole mesh first: that edge is the longest of every
-// triangle that has it, so all of them are bisected at its midpoint and the mesh conforms after each step. A
-// median to the longest edge is at most 0.87 of it, so the longest edge shrinks, and angles do not fall
-// below half the smallest of the tessellation (Rosenberg and Stenger, 1975). Ties go by vertex number, so the
-// order is the same on every run. Only edges over the limit are kept in the table.
+// multigrid techniques", 1984), the longest edge of the whole mesh first: all triangles that have it are bisected at its
+// midpoint, so the mesh conforms after each step. Needles, of which CAD tessellations are full, would become
+// three times as many at each halving: their medians are as long as their sides. So medians come a little later than
+// sides of their length, and one between coplanar triangles is flipped where the other diagonal is shorter, as it is once
+// the sides are halved (Lawson, 1977). Ties go by vertex number, so the order is the same on every run. Only edges
+// over the limit are kept in the table.
 #include "formats/part/subdivide.h"
 
 #include <fmt/format.h>
@@ -22,12 +23,17 @@
 namespace flexel {
 namespace {
 
+// Of the squared length, by which medians come. An edge that is split is so at most 1 / 0.9 shorter, squared, than the longest
+// of its triangles, and the median to it still shorter than itself: edges shrink.
+constexpr double kMedian = 0.9;
+constexpr double kFlat = 1e-12;  // of an edge: the distance from a plane of what lies in it
+
 struct LongEdge {
-  double length2 = 0;          // m^2
+  double rank = 0;             // m^2
   std::uint32_t a = 0, b = 0;  // vertices, a < b
   // The queue gives the greatest first: the longest, then the one with the lowest vertices.
   bool operator<(const LongEdge& other) const {
-    if (length2 != other.length2) return length2 < other.length2;
+    if (rank != other.rank) return rank < other.rank;
     return a != other.a ? a > other.a : b > other.b;
   }
 };
@@ -47,14 +53,23 @@ class Bisection {
   Bisection(Surface& surface, std::size_t first_polygon, double largest_edge)
       : vertices_(surface.vertices),
         vertex_columns_(surface.vertex_columns),
-        limit2_(largest_edge * largest_edge) {
+        polygon_face_(surface.polygon_face),
+        limit2_(largest_edge * largest_edge),
+        may_flip_(surface.vertex_columns.empty() && surface.polygon_columns.empty()) {
     for (std::size_t p = first_polygon; p < surface.polygon_count(); ++p) {
       const auto corners = surface.polygon(p);
       triangles_.push_back({corners[0], corners[1], corners[2]});
       origin_.push_back(static_cast<std::uint32_t>(p));
     }
     for (std::uint32_t t = 0; t < triangles_.size(); ++t)
-      for (std::size_t i = 0; i < 3; ++i) add(triangles_[t][i], triangles_[t][(i + 1) % 3], t);
+      for (std::size_t i = 0; i < 3; ++i) {
+        const std::uint32_t a = triangles_[t][i], b = triangles_[t][(i + 1) % 3];
+        if (length2(a, b) > limit2_) users_[key(a, b)].push_back(t);
+      }
+    for (const auto& [edge, users] : users_) {
+      const auto a = static_cast<std::uint32_t>(edge >> 32), b = static_cast<std::uint32_t>(edge);
+      queue_.push({(lies_in_a_plane({0, a, b}, users) ? kMedian : 1) * length2(a, b), a, b});
+    }
   }
 
   [[nodiscard]] bool done() const { return queue_.empty(); }
@@ -66,6 +81,7 @@ class Bisection {
     const auto entry = users_.find(key(edge.a, edge.b));
     const std::vector<std::uint32_t> users = std::move(entry->second);
     users_.erase(entry);
+    if (flip(edge, users)) return;
     const auto middle = static_cast<std::uint32_t>(vertices_.size());
     vertices_.push_back(0.5 * (vertices_[edge.a] + vertices_[edge.b]));
     for (auto& [name, column] : vertex_columns_) {
@@ -106,34 +122,87 @@ class Bisection {
   }
 
   // Notes that triangle t has the edge, if that is over the limit.
-  void add(std::uint32_t a, std::uint32_t b, std::uint32_t t) {
-    const double length2 = (vertices_[a] - vertices_[b]).squaredNorm();
-    if (!(length2 > limit2_)) return;
+  void add(std::uint32_t a, std::uint32_t b, std::uint32_t t, double rank = 1) {
+    if (!(length2(a, b) > limit2_)) return;
     std::vector<std::uint32_t>& users = users_[key(a, b)];
-    if (users.empty()) queue_.push({length2, std::min(a, b), std::max(a, b)});
+    if (users.empty()) queue_.push({rank * length2(a, b), std::min(a, b), std::max(a, b)});
     users.push_back(t);
+  }
+  void change_user(std::uint32_t a, std::uint32_t b, std::uint32_t before, std::uint32_t after) {
+    const auto entry = users_.find(key(a, b));
+    if (entry != users_.end()) std::replace(entry->second.begin(), entry->second.end(), before, after);
+  }
+
+  // Where the edge's corner in a triangle (3) stands.
+  [[nodiscard]] std::size_t place(std::uint32_t t, const LongEdge& edge) const {
+    std::size_t i = 0;
+    while (key(triangles_[t][i], triangles_[t][(i + 1) % 3]) != key(edge.a, edge.b)) ++i;
+    return i;
+  }
+
+  [[nodiscard]] double length2(std::uint32_t a, std::uint32_t b) const {
+    return (vertices_[a] - vertices_[b]).squaredNorm();
+  }
+
+  // Two triangles of one face and one plane have the edge.
+  [[nodiscard]] bool lies_in_a_plane(const LongEdge& edge, const std::vector<std::uint32_t>& users) const {
+    if (!may_flip_ || users.size() != 2 || users[0] == users[1]) return false;
+    const std::uint32_t s = users[0], t = users[1];
+    if (polygon_face_[origin_[s]] != polygon_face_[origin_[t]]) return false;
+    const std::size_t i = place(s, edge), j = place(t, edge);
+    const std::uint32_t a = triangles_[s][i], b = triangles_[s][(i + 1) % 3];
+    if (triangles_[t][j] != b) return false;  // they face opposite sides
+    const Vec3 along = vertices_[b] - vertices_[a];
+    const Vec3 normal = along.cross(vertices_[triangles_[s][(i + 2) % 3]] - vertices_[a]);
+    const Vec3 across = vertices_[triangles_[t][(j + 2) % 3]] - vertices_[a];
+    return std::abs(normal.dot(across)) <= kFlat * along.norm() * normal.norm();
+  }
+
+  // Triangles (a, b, c) and (b, a, d) of one face and one plane become (a, d, c) and (d, b, c) where c d is shorter and lies
+  // between a and b. False, with nothing changed, where not.
+  bool flip(const LongEdge& edge, const std::vector<std::uint32_t>& users) {
+    if (!lies_in_a_plane(edge, users)) return false;
+    const std::uint32_t s = users[0], t = users[1];
+    const std::size_t i = place(s, edge), j = place(t, edge);
+    const std::uint32_t a = triangles_[s][i], b = triangles_[s][(i + 1) % 3], c = triangles_[s][(i + 2) % 3],
+                        d = triangles_[t][(j + 2) % 3];
+    if (c == d || users_.contains(key(c, d)) || !(length2(c, d) < kMedian * length2(a, b))) return false;
+    const Vec3 normal = area_vector(a, b, c);
+    const double least = kFlat * normal.squaredNorm();
+    if (!(normal.dot(area_vector(a, d, c)) > least && normal.dot(area_vector(d, b, c)) > least)) return false;
+    triangles_[s] = {a, d, c};
+    triangles_[t] = {d, b, c};
+    change_user(a, d, t, s);
+    change_user(b, c, s, t);
+    add(c, d, s, kMedian);
+    add(c, d, t, kMedian);
+    return true;
+  }
+  // Twice the area.
+  [[nodiscard]] Vec3 area_vector(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
+    return (vertices_[b] - vertices_[a]).cross(vertices_[c] - vertices_[a]);
   }
 
   // Triangle (a, b, c), bisected at the middle of a b, becomes (a, middle, c) and a new (middle, b, c).
   void split(std::uint32_t t, const LongEdge& edge, std::uint32_t middle) {
-    std::size_t i = 0;
-    while (key(triangles_[t][i], triangles_[t][(i + 1) % 3]) != key(edge.a, edge.b)) ++i;
+    const std::size_t i = place(t, edge);
     const std::uint32_t a = triangles_[t][i], b = triangles_[t][(i + 1) % 3], c = triangles_[t][(i + 2) % 3];
     const auto added = static_cast<std::uint32_t>(triangles_.size());
     triangles_[t] = {a, middle, c};
     triangles_.push_back({middle, b, c});
     origin_.push_back(origin_[t]);
-    const auto moved = users_.find(key(b, c));
-    if (moved != users_.end()) std::replace(moved->second.begin(), moved->second.end(), t, added);
+    change_user(b, c, t, added);
     add(a, middle, t);
     add(middle, b, added);
-    add(middle, c, t);
-    add(middle, c, added);
+    add(middle, c, t, kMedian);
+    add(middle, c, added, kMedian);
   }
 
   std::vector<Vec3>& vertices_;
   Columns& vertex_columns_;
+  const decltype(Surface::polygon_face)& polygon_face_;
   double limit2_;                                        // m^2
+  bool may_flip_;                                        // what is between vertices is not interpolated
   std::vector<std::array<std::uint32_t, 3>> triangles_;  // corners
   std::vector<std::uint32_t> origin_;                    // (triangles) polygon it is a piece of
   std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> users_;  // triangles on each long edge

@@ -144,18 +144,23 @@ void add_triangle_lines(const MapReport& report, std::vector<std::string>& lines
         quality.largest_normal_jump_added));
 }
 
+// Of a volume, by its share, with its sign.
+std::string human_change(double share) {
+  constexpr double kLeast = 1e-4;  // human_share: "under 0.01 %"
+  return fmt::format("{}{}", share >= kLeast ? "+" : "", human_share(share));
+}
+
 std::string volume_line(const MapReport& report) {
   const SurfaceQuality& quality = report.quality;
   std::string line =
       fmt::format("vertices move by up to {}, stretched by up to {}",
                   human_length(report.largest_displacement), human_share(report.largest_strain));
   if (!(quality.volume_before > 0) || !std::isfinite(quality.volume_after)) return line;
-  const double change = 100 * (quality.volume_after / quality.volume_before - 1);
-  line += fmt::format(", volume {} -> {} ({:+.3g} %", human_volume(quality.volume_before),
-                      human_volume(quality.volume_after), change);
+  line += fmt::format(", volume {} -> {} ({}", human_volume(quality.volume_before),
+                      human_volume(quality.volume_after),
+                      human_change(quality.volume_after / quality.volume_before - 1));
   if (report.lattice_volume_before > 0)
-    line += fmt::format(", the lattice {:+.3g} %",
-                        100 * (report.lattice_volume_after / report.lattice_volume_before - 1));
+    line += ", the lattice " + human_change(report.lattice_volume_after / report.lattice_volume_before - 1);
   return line + ")";
 }
 
@@ -288,7 +293,7 @@ std::string report_table(const MapReport& report, const MapOptions& options) {
       continue;
     }
     for (const auto& [inner, of] : value.items())
-      table += fmt::format("{:<40}{}\n", name + "." + inner, cell_text(of));
+      table += fmt::format("{:<40}{}\n", fmt::format("{}.{}", name, inner), cell_text(of));
   }
   return table;
 }

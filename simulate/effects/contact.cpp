@@ -188,6 +188,13 @@ void Contact::parse(TableReader& scene, Parameters& parameters) {
   reader.finish();
 }
 
+bool Contact::Parameters::sticks() const {
+  return stick > 0 || !glued.empty() ||
+         std::any_of(sticky.begin(), sticky.end(), [](const auto& each) { return each.second > 0; }) ||
+         std::any_of(planes.begin(), planes.end(),
+                     [](const ContactPlane& plane) { return plane.stick.value_or(0) > 0; });
+}
+
 std::optional<Contact> Contact::make(const Parameters& parameters, const Problem& problem) {
   if (!parameters.on) return std::nullopt;
   ContactSettings settings;

@@ -49,6 +49,9 @@ class Contact : public Effect {
     std::vector<std::string> glued;                  // parts of [[manipulator]] with glue
     std::vector<ContactPlane> planes;
     std::string origin;
+
+    // Something of the scene sticks to something.
+    [[nodiscard]] bool sticks() const;
   };
   static constexpr const char* name = "contact";
 

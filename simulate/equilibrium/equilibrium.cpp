@@ -25,6 +25,7 @@
 #include "base/units.h"
 #include "simulate/equilibrium/rigid_link_equilibrium.h"
 #include "simulate/input/scene_words.h"
+#include "simulate/result/overload.h"
 #include "simulate/result/result.h"
 
 namespace flexel::simulate {
@@ -155,7 +156,7 @@ void LoadStepping::refuse_load() const {
     if (std::find(materials.begin(), materials.end(), part.material) == materials.end())
       materials.push_back(part.material);
   const double diagonal = bounding_box(mechanics_.body().rest).diagonal();
-  throw DivergedError(fmt::format(
+  throw OverloadError(fmt::format(
       "the load{} would move the part by {} at its first stiffness, {} times its size of {}: check the unit "
       "of "
       "the part (--unit), the load, and the stiffness of {}; in a scene, [run] load_steps = 10 tries it all "

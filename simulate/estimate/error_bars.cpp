@@ -4,17 +4,19 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 
 #include "base/error.h"
+#include "base/human.h"
 #include "base/program/progress_stretch.h"
 #include "base/stop.h"
 #include "formats/lattice/fields.h"
 #include "formats/lattice/quadratic_field.h"
 #include "simulate/estimate/coarsen.h"
-#include "simulate/estimate/narrow_support.h"
+#include "simulate/estimate/narrow_region.h"
 
 namespace flexel::simulate {
 namespace {
@@ -145,6 +147,44 @@ class CoarseRuns {
   bool quadratic_;
 };
 
+// On the region, or a point of the box around it.
+bool is_on(const Probe& probe, const std::vector<std::uint32_t>& region, const Body& body) {
+  if (probe.where) {
+    const std::vector<std::uint32_t> its = resolve(*probe.where, body).polygons;
+    return std::any_of(its.begin(), its.end(), [&](std::uint32_t each) {
+      return std::binary_search(region.begin(), region.end(), each);
+    });
+  }
+  Eigen::AlignedBox3d box;
+  for (const std::uint32_t polygon : region)
+    for (const std::uint32_t corner : body.surface.polygon(polygon))
+      box.extend(body.surface.vertices[corner]);
+  const Part& part = body.parts[body.surface.polygon_part(region.front())];
+  return probe.at && box.exteriorDistance(*probe.at) < part.lattice.spacing.mean();
+}
+
+// No bar of the largest displacement, or of a probe on the loaded region, is narrower than what the surface gives way there
+// unseen by the lattices: they spread the load over a cell each, and may agree on too little.
+void hold_indentations(const Body& body, const Scene& scene, ErrorBars& errors) {
+  for (const UnresolvedIndentation& each : indentations_under_two_cells(body, scene)) {
+    bool widened = false;
+    for (ErrorBar& bar : errors.bars) {
+      if (bar.of == ErrorBar::Of::elastic_energy) continue;
+      if (bar.of == ErrorBar::Of::probe && !is_on(scene.probes[bar.probe], each.polygons, body)) continue;
+      if (bar.bar.half_width >= each.depth) continue;
+      bar.bar.half_width = each.depth;
+      widened = true;
+    }
+    if (!widened) continue;
+    if (!errors.note.empty()) errors.note += "; ";
+    errors.note += fmt::format(
+        "the load \"{}\" acts on a narrow region (a strip of its area and rim is {} wide, under two cells), "
+        "which may sink in by {} "
+        "more: use a smaller spacing",
+        each.load, human_length(each.width), human_length(each.depth));
+  }
+}
+
 std::string first_sentence(const std::string& text) {
   return text.substr(0, text.find(": add "));
 }
@@ -205,6 +245,7 @@ ErrorBars estimate_errors(const Body& body, const Scene& scene, const SimulateOp
     errors.bars.push_back({probe ? ErrorBar::Of::probe : ErrorBar::Of::largest_displacement, probe ? p : 0,
                            probe ? result.probes[p].name : "", values.value[0], bar(values)});
   }
+  hold_indentations(body, scene, errors);
   const Sequence energy = runs.energy();
   errors.bars.push_back({ErrorBar::Of::elastic_energy, 0, "", energy.value[0], bar(energy)});
   const Sequence stress = runs.stress();

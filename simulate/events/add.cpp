@@ -27,6 +27,9 @@ void level(Columns& columns, std::size_t count, const Columns& others) {
 Add Add::parse(TableReader& reader) {
   Add made;
   made.origin_ = reader.place();
+  for (const char* key : {"every", "with"})
+    if (const SceneValue* given = reader.find(key))
+      reader.fail(given->line, fmt::format("a body is added once, where it is: leave \"{}\" out", key));
   const SceneValue& body = reader.require("body", "\"ball.vtu\"");
   const std::string path = body.kind == SceneValue::Kind::string ? body.text : "";
   if (path.empty()) reader.fail(body.line, "\"body\" needs the name of a body's file");

@@ -108,6 +108,10 @@ void cut_connections(Body& body, const Problem& problem, const std::vector<std::
       body.connections[connections.a[c]] &= ~(1u << (connections.kind[c] - 1));
 }
 
+bool takes_nothing(const std::vector<std::uint8_t>& keep) {
+  return std::find(keep.begin(), keep.end(), 0) == keep.end();
+}
+
 void renumber_fused(std::vector<FusedPoint>& fused, const std::vector<std::uint32_t>& element) {
   std::erase_if(fused, [&](FusedPoint& point) {
     for (std::uint32_t& e : point.elements)
@@ -132,6 +136,12 @@ std::string Carve::apply(EventContext& context) const {
   std::vector<std::uint8_t> cells = chosen.cells;
   for (std::uint8_t& cell : cells) cell = !cell;
   const std::vector<std::uint8_t> elements = elements_left(body, chosen, cells);
+  if (takes_nothing(cells) && takes_nothing(elements))
+    throw EmptySelectionError(
+        origin_,
+        fmt::format(
+            "carve: no cell has more than half of its elements in {}: take a larger region, or smaller cells",
+            describe(region_)));
   const std::size_t before = body.element_count() + body.cell_count();
   cut_connections(body, context.problem, elements);
   note_voxels(body, elements, cells);
@@ -158,18 +168,26 @@ std::string Carve::apply(EventContext& context) const {
   keep_rows(body.fill, cells);
   keep_rows(body.broken, cells);
   keep_rows(body.cell_columns, cells);
-  if (const std::size_t bare = renumber_surface(body, cell); bare > 0)
-    context.progress.warn(fmt::format(
-        "carve: {} polygon(s) of the surface lie over nothing now (column \"carved\"): where a mapping puts "
-        "them says nothing",
-        bare));
+  std::string bared;
+  if (const std::size_t bare = renumber_surface(body, cell); bare > 0) {
+    bared = fmt::format(
+        "{} polygon(s) of the surface lie over nothing now (column \"carved\"): where a mapping puts them "
+        "says nothing",
+        bare);
+    if (context.turns == 1) {
+      context.progress.warn("carve: " + bared);
+      bared.clear();
+    } else {  // told once, with what was done last
+      bared = "; " + bared;
+    }
+  }
   derive_connections(body);
   keep_rows(context.state.displacement, elements);
   keep_rows(context.state.velocity, elements);
   keep_rows(context.settled, elements);
   renumber_fused(context.fused, element);
-  return fmt::format("{} of {} elements and cells taken away ({})",
-                     before - body.element_count() - body.cell_count(), before, describe(region_));
+  return fmt::format("{} of {} elements and cells taken away ({}){}",
+                     before - body.element_count() - body.cell_count(), before, describe(region_), bared);
 }
 
 }  // namespace flexel::simulate

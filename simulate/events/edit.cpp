@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <tuple>
 
 #include "base/error.h"
@@ -43,6 +44,55 @@ void add_stick(Body& body, const std::vector<std::uint8_t>& chosen, double more)
     if (chosen[e]) column.values[e] += more;
 }
 
+// Rows of `chosen` that the column does not name yet; it names them then.
+void take_unmarked(Columns& columns, const std::string& name, std::vector<std::uint8_t>& chosen) {
+  if (chosen.empty()) return;
+  Column& column = columns[name];
+  if (column.components != 1 || column.values.size() != chosen.size())
+    column = {1, std::vector<double>(chosen.size(), 0)};
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    if (column.values[i] != 0) chosen[i] = 0;
+    if (chosen[i]) column.values[i] = 1;
+  }
+}
+
+// What an event that happens again and again has edited, by a column that is there between its first and its last time.
+class EditedAlready {
+ public:
+  EditedAlready(EventContext& context, const std::string& origin)
+      : context_(context), column_("edited_" + origin.substr(origin.rfind(':') + 1)) {
+    if (context_.turn == 0) forget();
+  }
+  EditedAlready(const EditedAlready&) = delete;
+  EditedAlready& operator=(const EditedAlready&) = delete;
+  ~EditedAlready() {
+    if (context_.turn + 1 == context_.turns) forget();
+  }
+  void leave_out(Chosen& chosen) {
+    if (context_.turns == 1) return;
+    take_unmarked(context_.body.cell_columns, column_, chosen.cells);
+    take_unmarked(context_.body.element_columns, column_, chosen.elements);
+  }
+
+ private:
+  void forget() {
+    context_.body.cell_columns.erase(column_);
+    context_.body.element_columns.erase(column_);
+  }
+  EventContext& context_;
+  std::string column_;
+};
+
+// A cell, or an element at the centre of a voxel; where elements at corners have what is edited, any of them.
+bool holds_any(const Body& body, const Chosen& chosen, bool at_corners) {
+  if (std::find(chosen.cells.begin(), chosen.cells.end(), 1) != chosen.cells.end()) return true;
+  return std::any_of(body.parts.begin(), body.parts.end(), [&](const Part& part) {
+    const auto end = chosen.elements.begin() + part.element_end;
+    return (at_corners || part.placement == Placement::centre) &&
+           std::find(chosen.elements.begin() + part.element_begin, end, 1) != end;
+  });
+}
+
 constexpr std::size_t kConnectionsOfElement = half_neighbourhood.size();
 
 // A column of connections, 0 where it has not been.
@@ -79,6 +129,8 @@ Edit Edit::parse(TableReader& reader) {
   made.radius_ = factor(reader, "radius");
   made.stick_ = reader.quantity("stick", Dimension::pressure).value_or(0);
   made.origin_ = reader.place();
+  if (made.of_ != Of::elements && reader.find("every"))
+    reader.fail(reader.find("every")->line, "connections are edited once: leave \"every\" out");
   if (made.of_ == Of::elements && made.length_ != 1)
     reader.fail("\"length\" is that of connections: give \"connections\" = \"inside\" or \"across\" too");
   if (made.of_ != Of::elements && made.changes_elements_only())
@@ -133,8 +185,19 @@ std::string Edit::edit_connections(EventContext& context, const Chosen& chosen) 
 }
 
 std::string Edit::apply(EventContext& context) const {
-  const Chosen chosen = choose(region_, context.body, context.state);
+  EditedAlready edited(context, origin_);  // a tool may pass twice
+  Chosen chosen = choose(region_, context.body, context.state);
   if (of_ != Of::elements) return edit_connections(context, chosen);
+  const bool at_corners = friction_ != 1 || stick_ != 0 || radius_ != 1;
+  if (!holds_any(context.body, chosen, at_corners))
+    throw EmptySelectionError(
+        origin_,
+        fmt::format("edit: no cell has more than half of its elements in {}: take a larger region, or "
+                    "smaller cells",
+                    describe(region_)));
+  edited.leave_out(chosen);
+  if (!holds_any(context.body, chosen, at_corners))
+    throw EmptySelectionError(origin_, fmt::format("all of {} was edited already", describe(region_)));
   std::vector<std::uint8_t> elements = chosen.elements;
   for (const Part& part : context.body.parts)
     if (part.placement == Placement::corner)

@@ -158,6 +158,17 @@ void drop_repeated(std::vector<FusedPoint>& fused, std::size_t before) {
               fused.end());
 }
 
+using ElementAndPart = std::pair<std::uint32_t, std::uint32_t>;
+
+// Elements that are fused to a cell, and the part of that: once more, to a cell beside it, would be twice as stiff.
+std::set<ElementAndPart> fused_to_cells(const std::vector<FusedPoint>& fused,
+                                        const std::vector<std::uint32_t>& part_of) {
+  std::set<ElementAndPart> known;
+  for (const FusedPoint& point : fused)
+    if (point.elements.size() > 2) known.insert({point.elements[0], part_of[point.elements[1]]});
+  return known;
+}
+
 std::size_t fuse_parts(EventContext& context, const Chosen& chosen, const std::vector<Vec3>& now,
                        double within) {
   const Body& body = context.body;
@@ -171,6 +182,8 @@ std::size_t fuse_parts(EventContext& context, const Chosen& chosen, const std::v
     if (!body.broken[c])
       for (const std::uint32_t e : body.cell_elements[c]) ++cells_at[e];
   const std::size_t before = context.fused.size();
+  const std::set<ElementAndPart> known = fused_to_cells(context.fused, part_of);
+  std::size_t found = 0;
   for (std::uint32_t e = 0; e < body.element_count(); ++e) {
     const bool is_centre = body.parts[part_of[e]].placement == Placement::centre;
     // inner ones touch nothing
@@ -193,9 +206,11 @@ std::size_t fuse_parts(EventContext& context, const Chosen& chosen, const std::v
         best->weights.push_back(-weights[a]);
       }
     });
-    if (best) context.fused.push_back(std::move(*best));
+    if (!best) continue;
+    ++found;
+    if (!known.contains({e, part_of[best->elements[1]]})) context.fused.push_back(std::move(*best));
   }
-  const std::size_t found = context.fused.size() - before + connect_elements(context, chosen, now, within);
+  found += connect_elements(context, chosen, now, within);
   drop_repeated(context.fused, before);
   return found;
 }
@@ -262,7 +277,7 @@ std::string Fuse::apply(EventContext& context) const {
   const std::size_t points = fuse_parts(context, chosen, now, within_);
   const std::size_t cells = heal(context, chosen, now, within_);
   if (points + cells == 0)
-    throw InputError(
+    throw EmptySelectionError(
         origin_,
         fmt::format("fuse: in {} nothing of one part is within {} of another (at centre placement from "
                     "element to element), and no broken cell is nearly whole",

@@ -333,7 +333,7 @@ Selected resolve_region(const Selection& selection, const Body& body, const std:
     if (holds(selection, at[e])) selected.elements.push_back(e);
   if (selected.elements.empty()) {
     const Box box = bounding_box(at);
-    throw InputError(
+    throw EmptySelectionError(
         selection.origin,
         fmt::format("the {} holds no element; the elements lie from ({}, {}, {}) to ({}, {}, {}){}",
                     describe(selection), human_length(box.min.x()), human_length(box.min.y()),

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "base/error.h"
 #include "formats/lattice/body.h"
 
 namespace flexel::simulate {
@@ -19,6 +20,12 @@ struct Selection {
   double radius = 0;               // m
   std::vector<Selection> members;  // any_of: their union; complement: the one that is left out
   std::string origin;              // "beam.toml:12" or "--fix", for messages
+};
+
+// A box, a sphere or a half-space that holds no element.
+class EmptySelectionError : public InputError {
+ public:
+  using InputError::InputError;
 };
 
 [[nodiscard]] Selection select_by_name(std::string name, std::string origin = "");

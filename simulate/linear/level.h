@@ -109,7 +109,7 @@ void prepare_smoother(const std::vector<BlockType>& diagonal, const Multiply& mu
   for (const BlockType& block : diagonal) largest = std::max(largest, block.diagonal().cwiseAbs().maxCoeff());
   level.inverse_diagonal.resize(n);
   parallel_for_each(n, [&](std::size_t i) {
-    const Eigen::Matrix<double, R, R> block = diagonal[i];
+    const Eigen::Matrix<double, R, R>& block = diagonal[i];
     level.inverse_diagonal[i] = guarded_inverse<R>(block, 1e-14 * largest).template cast<float>();
   });
   const bool onwards = estimate == Estimate::onwards && level.eigenvector.size() == n * R;

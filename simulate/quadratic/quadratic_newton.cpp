@@ -17,6 +17,7 @@
 #include "simulate/linear/vector_products.h"
 #include "simulate/quadratic/corotation.h"
 #include "simulate/quadratic/quadratic_links.h"
+#include "simulate/result/overload.h"
 
 namespace flexel::simulate {
 namespace {
@@ -184,7 +185,7 @@ class LargeDeflection {
 
   void refuse_out_of_proportion(const std::string& scene) const {
     if (reach_ > kOutOfProportion * extent_)
-      throw DivergedError(
+      throw OverloadError(
           fmt::format("{}: {}; or, if that is meant, write [run] load_steps = 4", scene, overload()));
   }
 

@@ -14,6 +14,20 @@ namespace flexel::simulate {
 
 template <class... E>
 struct EventList {
+  // `every` and `until`; how often it happens by `until`, of the run's time where that is not given, is left to the caller.
+  static void parse_turns(TableReader& reader, bool timed, Event& event) {
+    const SceneValue* every = reader.find("every");
+    const SceneValue* until = reader.find("until");
+    if (const SceneValue* given = every ? every : until; given && !timed)
+      reader.fail(given->line, "at equilibrium an event happens once: leave \"every\" and \"until\" out");
+    if (until && !every)
+      reader.fail(until->line, "\"until\" ends what happens \"every\" so often: give that too");
+    if (!every) return;
+    event.every = reader.to_quantity(*every, Dimension::time, "every");
+    if (!(event.every > 0)) reader.fail(every->line, "\"every\" needs to be above 0");
+    if (until) event.until = reader.to_quantity(*until, Dimension::time, "until");
+  }
+
   // [[event]] of a scene; `timed`: of a run in time, where it has a time, at equilibrium it has none (0). Throws
   // InputError.
   [[nodiscard]] static Event parse(TableReader& reader, bool timed) {
@@ -35,6 +49,7 @@ struct EventList {
       reader.fail(what.line, fmt::format("no event \"{}\"{}; known: {}", what.text,
                                          did_you_mean(what.text, names), fmt::join(names, ", ")));
     }
+    parse_turns(reader, timed, *event);
     reader.finish();
     return std::move(*event);
   }

@@ -194,6 +194,27 @@ RunSettings parse_run(TableReader& root) {
   return run;
 }
 
+// One after the other; at an event the run begins anew, so they are no steps.
+void add_turns(const Event& event, double duration, const TableReader& reader, std::vector<Event>& events) {
+  constexpr double kMostTurns = 10'000;
+  const double until = event.until.value_or(duration);
+  if (!(until >= event.at && until <= duration))
+    reader.fail(
+        fmt::format("\"until\" = {:.6g} s is not between \"at\" and the end of the run, {:.6g} s to {:.6g} s",
+                    until, event.at, duration));
+  const double turns = std::floor((until - event.at) / event.every * (1 + 1e-12)) + 1;
+  if (turns > kMostTurns)
+    reader.fail(fmt::format("\"every\" would be {:.6g} times, and at most {:.0f} are: give a longer time",
+                            turns, kMostTurns));
+  for (double turn = 0; turn < turns; ++turn) {
+    Event one = event;
+    one.at = std::min(event.at + turn * event.every, duration);
+    one.turn = static_cast<std::size_t>(turn);
+    one.turns = static_cast<std::size_t>(turns);
+    events.push_back(std::move(one));
+  }
+}
+
 void parse_events(TableReader& root, Scene& scene) {
   for (const SceneValue* table : root.tables("event")) {
     TableReader reader(*table, root.file(), "[[event]]");
@@ -201,7 +222,14 @@ void parse_events(TableReader& root, Scene& scene) {
     if (scene.run.time && !(event.at >= 0 && event.at <= *scene.run.time))
       reader.fail(
           fmt::format("\"at\" = {:.6g} s is not within the run, 0 s to {:.6g} s", event.at, *scene.run.time));
-    scene.events.push_back(std::move(event));
+    if (event.every > 0 && std::any_of(scene.events.begin(), scene.events.end(), [&](const Event& other) {
+          return other.turns > 1 && other.origin == event.origin;  // by which they are told apart
+        }))
+      reader.fail("two events with \"every\" begin on one line: give each a line of its own");
+    if (event.every > 0)
+      add_turns(event, *scene.run.time, reader, scene.events);
+    else
+      scene.events.push_back(std::move(event));
   }
   std::stable_sort(scene.events.begin(), scene.events.end(),
                    [](const Event& a, const Event& b) { return a.at < b.at; });

@@ -18,6 +18,7 @@
 #include "formats/lattice/fused_points.h"
 #include "simulate/contact/pairs/stuck_places.h"
 #include "simulate/effects/contact.h"
+#include "simulate/events/repeated_events.h"
 #include "simulate/live/live_link.h"
 #include "simulate/models/damping_factors.h"
 #include "simulate/models/rest_shape.h"
@@ -35,6 +36,7 @@ namespace {
 constexpr int kCheck = 100;          // steps between checks; implicit ones are checked one by one
 constexpr std::size_t kRows = 1000;  // of the history, unless the scene says otherwise
 constexpr std::size_t kFrames = 50;  // likewise
+constexpr double kSameTime = 1e-12;  // share of a time
 
 class TimedRun {
  public:
@@ -83,7 +85,8 @@ class TimedRun {
   std::optional<Checkpoint> kept_;  // with --checkpoint: where the run can go on from
   Bytes act_body_;                  // likewise: the body as the present act began, to be made with it
   std::chrono::steady_clock::time_point saved_ = began_;
-  std::size_t events_ = 0;      // that have happened
+  std::size_t events_ = 0;  // that have happened
+  RepeatedEvents repeated_;
   std::size_t frames_ = 0;      // so far
   bool at_whole_step_ = false;  // velocities are of the time of the state, after an event
   double next_row_ = 0, next_frame_ = 0;
@@ -135,6 +138,15 @@ void TimedRun::begin() {
   if (!stuck.empty()) start_.transferred_states = {{Contact::name, transfer_of(stuck)}};
   segment_.emplace(body_, scene_, options_, progress_, start_, state_of(body_));
   start_.transferred_states.clear();
+  const bool sticks = scene_.get<Contact>().sticks() || body_.element_columns.contains("stick_change");
+  if (!stuck.empty() && !sticks) {
+    progress_.warn(
+        fmt::format("{}: {} places of surfaces stuck together at the end of an earlier run; nothing of this "
+                    "scene has stick, "
+                    "and they come off: stick in its [contact] keeps them",
+                    scene_.name, stuck.size()));
+    return;
+  }
   std::size_t found = 0;
   for (const auto& [name, transferred] : segment_->transferred_states())
     if (name == Contact::name) found = stuck_in(transferred).size();
@@ -294,7 +306,7 @@ void TimedRun::enter_half_step() {
 
 // From the beginning of an act to its end, or from where a checkpoint has it to there.
 void TimedRun::play_until(double end, bool resumed) {
-  const auto goes_on = [&] { return *segment_->state().time < end * (1 - 1e-12) && !over(); };
+  const auto goes_on = [&] { return *segment_->state().time < end * (1 - kSameTime) && !over(); };
   const bool first = clock_.steps == 0 && goes_on() && !resumed;
   clock_.until = end;
   if (goes_on() && !resumed) segment_->choose_step(clock_);
@@ -335,8 +347,8 @@ void TimedRun::apply(std::size_t end) {
     ledger.changed = !ledger.rows.empty();
     history_.reset();
   }
-  at_whole_step_ = clock_.steps > 0 && segment_->kicks();
-  if (at_whole_step_) segment_->kick(0.5 * clock_.previous);
+  const bool was_whole = std::exchange(at_whole_step_, clock_.steps > 0 && segment_->kicks());
+  if (at_whole_step_ && !was_whole) segment_->kick(0.5 * clock_.previous);
   segment_->store(segment_->state());
   segment_->add_effort(result_, options_.explain);
   start_.transferred_states = segment_->transferred_states();
@@ -349,9 +361,10 @@ void TimedRun::apply(std::size_t end) {
   for (; events_ < end; ++events_) {
     const Event& event = scene_.events[events_];
     const Problem problem = timed_problem(body_, scene_, start_);
-    EventContext context{body_, state, start_.fused, start_.settled, problem, progress_};
-    const std::string what = event.apply(context);
-    progress_.say(fmt::format("at {:.4g} s {}: {}", event.at, event.name, what));
+    EventContext context{body_,   state,     start_.fused, start_.settled,
+                         problem, progress_, event.turn,   event.turns};
+    const std::string what = repeated_.happen(event, context);
+    if (!what.empty()) progress_.say(fmt::format("at {:.4g} s {}: {}", event.at, event.name, what));
   }
   for (auto& [name, transferred] : start_.transferred_states)
     if (name == Contact::name)
@@ -374,7 +387,8 @@ void TimedRun::play() {
   while (events_ < scene_.events.size() && !over()) {
     const double at = scene_.events[events_].at;
     std::size_t end = events_ + 1;
-    while (end < scene_.events.size() && scene_.events[end].at == at) ++end;
+    // times that rounding alone tells apart, as 3 x 0.1 s and 0.3 s, are one: no step lies between them
+    while (end < scene_.events.size() && at >= scene_.events[end].at * (1 - kSameTime)) ++end;
     play_until(at, std::exchange(resumed, false));
     if (over()) break;
     apply(end);

@@ -5,7 +5,6 @@
 
 #include <BRepAlgoAPI_Cut.hxx>
 #include <BRepCheck_Analyzer.hxx>
-#include <BRepGProp.hxx>
 #include <BRepMesh_IncrementalMesh.hxx>
 #include <BRepPrimAPI_MakeBox.hxx>
 #include <BRepPrimAPI_MakeCone.hxx>
@@ -14,7 +13,6 @@
 #include <BRepPrimAPI_MakeTorus.hxx>
 #include <BRep_Builder.hxx>
 #include <BRep_Tool.hxx>
-#include <GProp_GProps.hxx>
 #include <Geom_CylindricalSurface.hxx>
 #include <Geom_Plane.hxx>
 #include <Poly_Triangulation.hxx>
@@ -25,14 +23,12 @@
 #include <TopoDS_Face.hxx>
 #include <cmath>
 
+#include "tests/cad/shape_volume.h"
+
 namespace flexel::cad {
 namespace {
 
-double volume(const TopoDS_Shape& shape) {
-  GProp_GProps properties;
-  BRepGProp::VolumeProperties(shape, properties, 1e-7);
-  return properties.Mass();
-}
+using testing::shape_volume;
 
 // About the z axis, by an angle that grows along it: keeps the volume.
 gp_XYZ twist(const gp_XYZ& p) {
@@ -73,7 +69,7 @@ TEST(DeformShape, SolidsStayValidAndKeepTheirVolume) {
       const DeformedGeometry geometry(shape, same_everywhere(map), {kTolerance, 5});
       const DeformedShape deformed = deform_shape(shape, geometry);
       EXPECT_TRUE(BRepCheck_Analyzer(deformed.shape).IsValid()) << name;
-      EXPECT_NEAR(volume(deformed.shape) / volume(shape), 1, 3e-5) << name;
+      EXPECT_NEAR(shape_volume(deformed.shape) / shape_volume(shape), 1, 3e-5) << name;
       TopTools_IndexedMapOfShape before, after;
       TopExp::MapShapes(shape, TopAbs_FACE, before);
       TopExp::MapShapes(deformed.shape, TopAbs_FACE, after);
@@ -124,7 +120,7 @@ TEST(DeformShape, ARigidMotionKeepsPlanesAndCylinders) {
   EXPECT_EQ(cylinders, 1u);
   const DeformedShape moved = deform_shape(drilled, geometry);
   EXPECT_TRUE(BRepCheck_Analyzer(moved.shape).IsValid());
-  EXPECT_NEAR(volume(moved.shape) / volume(drilled), 1, 1e-9);
+  EXPECT_NEAR(shape_volume(moved.shape) / shape_volume(drilled), 1, 1e-9);
 }
 
 // Pcurves stay, so whatever the tolerance of an edge or a vertex covers in the shape has to be covered after it.

@@ -21,19 +21,16 @@
 #include <cmath>
 
 #include "cad/deform/deform_shape.h"
+#include "tests/cad/shape_volume.h"
 
 namespace flexel::cad {
 namespace {
 
+using testing::shape_volume;
+
 double area(const TopoDS_Shape& shape) {
   GProp_GProps properties;
   BRepGProp::SurfaceProperties(shape, properties, 1e-9);
-  return properties.Mass();
-}
-
-double enclosed_volume(const TopoDS_Shape& shape) {
-  GProp_GProps properties;
-  BRepGProp::VolumeProperties(shape, properties, 1e-9);
   return properties.Mass();
 }
 
@@ -80,7 +77,7 @@ TEST(SphereFrames, NoPoleIsLeftAndAllElseStays) {
     const TurnedShape turned = turn_spheres(ball);
     EXPECT_EQ(poles(turned.shape), 0);
     EXPECT_TRUE(BRepCheck_Analyzer(turned.shape).IsValid());
-    EXPECT_NEAR(enclosed_volume(turned.shape), enclosed_volume(ball), 1e-6 * enclosed_volume(ball));
+    EXPECT_NEAR(shape_volume(turned.shape), shape_volume(ball), 1e-6 * shape_volume(ball));
     EXPECT_LT(widest_gap(turned.shape), 1e-7);
     TopTools_IndexedMapOfShape before, after;
     TopExp::MapShapes(ball, TopAbs_FACE, before);
@@ -114,8 +111,8 @@ TEST(SphereFrames, WhatIsTurnedCanBeDeformed) {
     const DeformedShape deformed = deform_shape(turned, geometry);
     EXPECT_TRUE(BRepCheck_Analyzer(deformed.shape).IsValid());
     EXPECT_EQ(poles(deformed.shape), 0);
-    EXPECT_NEAR(enclosed_volume(deformed.shape), enclosed_volume(ball),
-                1e-4 * enclosed_volume(ball));  // det J = 1
+    EXPECT_NEAR(shape_volume(deformed.shape), shape_volume(ball),
+                1e-4 * shape_volume(ball));  // det J = 1
   }
 }
 

@@ -102,7 +102,7 @@ struct Miss {
 Miss miss_on_rib(const TopoDS_Shape& before, const CadWritten& written, const Body& body, double middle) {
   CadReadJob job;
   job.format = "brep";
-  job.bytes = written.file;
+  job.bytes = written.files.front().bytes;
   job.where = job.file = "bent.brep";
   const CadShape after = read_shape(job, {});
   const TopTools_IndexedMapOfShape old_faces = faces_of(before), new_faces = faces_of(*after.shape);
@@ -135,7 +135,7 @@ Told write_frame(double low, double high) {
   const Body body = waving(shape);
   CadWriteJob job;
   job.body = body_bytes(body);
-  job.format = "brep";
+  job.formats = {"brep"};
   job.method = "blended";
   job.tolerance = kAskedTolerance;
   Told told{write_deformed(job, [](const std::string&) {}), {}};

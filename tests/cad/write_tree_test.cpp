@@ -4,9 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <BRepBuilderAPI_Copy.hxx>
-#include <BRepGProp.hxx>
 #include <BRepPrimAPI_MakeBox.hxx>
-#include <GProp_GProps.hxx>
 #include <Interface_Static.hxx>
 #include <STEPCAFControl_Writer.hxx>
 #include <STEPControl_Controller.hxx>
@@ -25,15 +23,12 @@
 
 #include "base/files/memory_file.h"
 #include "cad/read/assembly_paths.h"
+#include "tests/cad/shape_volume.h"
 
 namespace flexel::cad {
 namespace {
 
-double solid_volume(const TopoDS_Shape& shape) {
-  GProp_GProps properties;
-  BRepGProp::VolumeProperties(shape, properties);
-  return properties.Mass();
-}
+using testing::shape_volume;
 
 // Two boxes of one product, 100 mm apart, in an assembly; the second use has a colour of its own.
 CadTree assembly(const std::string& unit, const std::string& schema) {
@@ -81,7 +76,7 @@ TEST(WriteTree, UnitsAndSchemasComeBack) {
       EXPECT_EQ(back.schema.substr(0, 5), std::string(schema).substr(0, 5));
       EXPECT_EQ(back.time, "2001-02-03T04:05:06");
       ASSERT_EQ(back.solids, 2u);
-      EXPECT_NEAR(solid_volume(back.roots.at(0).children.at(0).shape), 6000, 1e-6)
+      EXPECT_NEAR(shape_volume(back.roots.at(0).children.at(0).shape), 6000, 1e-6)
           << unit;  // mm^3, whatever the unit
       EXPECT_NEAR(back.roots[0].children.at(1).location.Transformation().TranslationPart().X(), 100, 1e-9)
           << unit;

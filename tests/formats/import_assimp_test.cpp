@@ -218,6 +218,18 @@ TEST(ImportAssimp, EveryUseIsAPartInItsPlaceSizeAndAxes) {
   EXPECT_EQ(drawing.vertices.size(), 6u);
 }
 
+TEST(ImportAssimp, NodesWithOthersBelowAreAssemblies) {
+  const Scratch scratch;
+  const std::string part = R"(<node id="a" name="pin"><instance_geometry url="#w"/></node>)",
+                    joint = R"(<node id="joint/1" name="joint/1">)" + part + "</node>";
+  const Surface surface =
+      import_surface(scratch.write("a.dae", collada("", R"(<node id="arm" name="arm">)" + joint + joint +
+                                                            R"(<node id="empty" name="empty"/></node>)")));
+  std::vector<std::string> assemblies;
+  for (const SurfacePart& each : surface.parts) assemblies.push_back(each.assembly);
+  EXPECT_EQ(assemblies, (std::vector<std::string>{"", "arm/joint_1", "arm/joint_1-2"}));
+}
+
 TEST(ImportAssimp, FormatsAreToldByTheirBytes) {
   const Scratch scratch;
   const auto format = [&](const std::string& text) {

@@ -153,11 +153,13 @@ TEST(CadJob, AJobComesBackAsItWas) {
   EXPECT_EQ(job.read->threads, read.threads);
   CadWriteJob write;
   write.body = some_bytes(10);
+  write.formats = {"step", "brep"};
   write.method = "blended";
   write.tolerance = 1e-4;
   const CadJob other = unpack_job(pack(write));
   ASSERT_TRUE(other.write && !other.read);
   EXPECT_EQ(other.write->body, write.body);
+  EXPECT_EQ(other.write->formats, write.formats);
   EXPECT_EQ(other.write->method, write.method);
   EXPECT_EQ(other.write->tolerance, write.tolerance);
 }

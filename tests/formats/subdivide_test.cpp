@@ -6,7 +6,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "base/math/area_vector.h"
 #include "formats/exchange/surface_file.h"
@@ -99,6 +101,43 @@ TEST(Subdivide, StopsAtTheMostTrianglesWithAClosedMesh) {
   EXPECT_GE(fine.polygon_count(), 5000u);
   EXPECT_LE(fine.polygon_count(), 5001u);
   expect_same_solid(coarse, fine);
+}
+
+// A rod along x, each of its flat sides two needles.
+Surface rod(int sides) {
+  std::string text = "o rod\n";
+  for (int end = 0; end < 2; ++end)
+    for (int i = 0; i < sides; ++i) {
+      const double angle = 2 * std::numbers::pi * i / sides;
+      text += fmt::format("v {} {:.17g} {:.17g}\n", 200 * end, 5 * std::cos(angle), 5 * std::sin(angle));
+    }
+  for (int i = 0; i < sides; ++i) {
+    const int a = i + 1, b = (i + 1) % sides + 1, c = b + sides, d = a + sides;
+    text += fmt::format("f {} {} {}\nf {} {} {}\n", a, b, c, a, c, d);
+  }
+  for (int i = 1; i < sides - 1; ++i) text += fmt::format("f 1 {} {}\n", i + 2, i + 1);
+  for (int i = 1; i < sides - 1; ++i)
+    text += fmt::format("f {} {} {}\n", 1 + sides, i + 1 + sides, i + 2 + sides);
+  const Scratch scratch;
+  ImportOptions options;
+  options.unit = 1e-3;
+  return import_surface(scratch.write("rod.obj", text), options);
+}
+
+TEST(Subdivide, NeedlesBecomeStrips) {
+  const Surface coarse = rod(40);
+  Surface fine = coarse;
+  ASSERT_TRUE(subdivide(fine, 0, 3.3e-3, 1'000'000));
+  EXPECT_LE(longest_edge(fine), 3.3e-3);
+  expect_same_solid(coarse, fine);
+  // 64 pieces of each side, two triangles each, and the ends.
+  EXPECT_LT(fine.polygon_count(), 40 * 128u + 300);
+  // What lies at vertices and polygons is between them as before: nothing is flipped.
+  Surface coloured = coarse;
+  coloured.vertex_columns["heat"] = {1, std::vector<double>(coarse.vertices.size(), 1.0)};
+  ASSERT_TRUE(subdivide(coloured, 0, 3.3e-3, 1'000'000));
+  expect_same_solid(coarse, coloured);
+  EXPECT_GT(coloured.polygon_count(), fine.polygon_count());
 }
 
 TEST(Subdivide, PolygonsBeforeTheFirstStayAsTheyAre) {

@@ -24,7 +24,7 @@ std::vector<Bytes> corpus() {
   mesh.warnings = {"a line"};
   mesh.result.face_colors.assign(3 * mesh.result.surface.faces.size(), 0.5);
   JobAnswer<CadWritten> written;
-  written.result.file = fuzz::bytes_of("ISO-10303-21;");
+  written.result.files = {{fuzz::bytes_of("ISO-10303-21;"), 1}};
   written.result.missed = {{"bracket/12", 1e-6}};
   JobAnswer<ForeignMesh> foreign;
   foreign.result.vertices = mesh.result.surface.vertices;

@@ -103,7 +103,7 @@ def test_4040_base_mount_step():
 
 
 def test_base_interface_step():
-    through_the_chain("base_interface_AP203.STEP", 8000)
+    through_the_chain("base_interface_AP203.STEP", 3000)
 
 
 def test_featuretype_step():

@@ -28,7 +28,7 @@ def test_every_part_ends_in_a_lattice_or_in_one_line():
 def test_the_first_answer_is_right_or_refused():
     if not PARTS.is_dir():
         raise Skip(f"{PARTS} is not there")
-    done = expect_ok(run(sys.executable, SOURCE / "tools/first-answers", "--bin", BIN, "--parts", PARTS, "-o", "answers.md", "multibody.stl",
+    done = expect_ok(run(sys.executable, SOURCE / "tools/first-answers", "--bin", BIN, "--parts", PARTS, "-o", "answers.md", "angle_block.STL",
                          "box_UTF16BE.obj", "planar-geom-03.stl", timeout=280))
     said = done.out.decode()
     expect("3 parts: 1 right, 2 refused, 0 wrong" in said, said)

@@ -130,9 +130,11 @@ def test_real_parts_that_are_refused():
     expect_error(refused, "flexel-voxelize", "edges where more than two triangles meet")
     expect_ok(voxelize(part("nonmanifold_cells_symmetrical.stl"), "--count", "2000", *advised(refused.err, "--heal wrap")))
     expect_error(voxelize(part("spinal_implant.3mf")), "flexel-voxelize", "is a lattice of 11821 beams", "leave the object out of the build")
-    refused = voxelize(part("2CylinderEngine.glb"), "--count", "3000")
-    expect_error(refused, "flexel-voxelize", "is larger than 22 of 67 parts")
-    expect_ok(voxelize(part("2CylinderEngine.glb"), *advised(refused.err, r'--size "[^"]*"')))
+    expect_error(voxelize(part("2CylinderEngine.glb"), "--count", "3000"), "flexel-voxelize", "is larger than 22 of 67 parts", '--size "12 m"')
+    need_step()
+    refused = voxelize(part("as1-oc-214.stp"), "--count", "300")
+    expect_error(refused, "flexel-voxelize", "is larger than 8 of 18 parts")
+    expect_ok(voxelize(part("as1-oc-214.stp"), *advised(refused.err, r'--size "[^"]*"')))
 
 
 def test_names_that_mean_two_things():

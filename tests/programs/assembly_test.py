@@ -49,7 +49,7 @@ def test_a_bolt_and_a_plate_are_bonded_or_in_contact_as_the_scene_says():
     need("gmsh")
     write("bolted.geo", BOLTED)
     run("gmsh", "bolted.geo", "-0", "-v", "1")
-    expect_ok(run("flexel-voxelize", "bolted.step", "--size", "1.5 mm", "-o", "body.vtu"))
+    expect_ok(run("flexel-voxelize", "bolted.step", "--size", "2 mm", "-o", "body.vtu"))
     plate, bolt = ("bolted", "bolted-2")
     expect(abs(moved("", 1, plate, bolt) - 1) < .2, "bonded, the plate comes along")
     expect(abs(moved("contact = true", 1, plate, bolt)) < .05, "in contact, the bolt lifts off")
@@ -86,6 +86,56 @@ def test_a_bolt_that_fills_its_hole_is_no_press_fit():
     expect(abs(left[2] + right[2] - 20) < .1, f"the ends bear the load: {left} {right}")
     # of 20 N in the middle between clamped ends; the rims of the hole pressed with over 100 N
     expect(abs(left[0]) < 20 and abs(right[0]) < 20, f"the bolt does not press the ends apart: {left} {right}")
+
+
+SWOLLEN = """[parts.fitted]
+material = "plate"
+[parts.fitted-2]
+material = "pin"
+[[thermal]]
+part = "fitted"
+change = "0 K"
+[[thermal]]
+part = "fitted-2"
+change = "16.667 K"
+[materials.plate]
+young = "3.25 GPa"
+poisson = 0.36
+density = "1240 kg/m3"
+expansion = "1e-3 /K"
+[materials.pin]
+young = "3.25 GPa"
+poisson = 0.36
+density = "1240 kg/m3"
+expansion = "1e-3 /K"
+"""
+
+HELD = "".join(f'[[fix]]\nwhere = "fitted/{side}"\n' for side in ("xmin", "xmax"))
+
+
+def test_a_press_fit_presses_as_a_pin_that_swells():
+    need_step()
+    need("gmsh")
+
+    def pushes(radius, text):
+        """N, along the plate."""
+        write("fitted.geo", BOLTED.split("Cylinder(4)")[0].replace("0, 0, 7, 4", "0, 0, 7, 3") + f'Cylinder(4) = {{0, 0, -6, 0, 0, 15, {radius}}};\nSave "fitted.step";\n')
+        run("gmsh", "fitted.geo", "-0", "-v", "1")
+        expect_ok(run("flexel-voxelize", "fitted.step", "--size", "2 mm", "-o", "body.vtu", "--quiet", "--force"))
+        scene("fit.toml", text + HELD)
+        expect_ok(run("flexel-simulate", "fit.toml", "body.vtu", "-o", "pressed.vtu", "--no-estimate", "--summary", "s.json", "--quiet", "--force"))
+        left, right = (each["force"] for each in json.loads(pathlib.Path("s.json").read_text())["reactions"])
+        expect(abs(left[0] + right[0]) < .01 * max(1, abs(left[0])), f"{left} {right}")
+        return left[0]
+
+    load = '[[load]]\nwhere = "fitted-2/zmax"\nforce = ["0 N", "0 N", "-1 mN"]\n'
+    at_once = 'material = "PLA"\ncontact = true\n' + load
+    let_out = 'material = "PLA"\n[contact]\noverlap = "part"\noverlap_time = "20 ms"\n' + load
+    swollen = pushes(3, SWOLLEN)
+    for text in (at_once, let_out):
+        # of 50 um a fifth is the soft part, and of what is left contact's own yielding takes a share
+        expect(.5 < pushes(3.05, text) / swollen < .85, f"{pushes(3.05, text)} N, swollen {swollen} N: {text}")
+        expect(abs(pushes(3, text)) < .01 * swollen, f"a pin that just fits presses nothing: {text}")
 
 
 def test_names_of_assemblies_stand_for_their_parts():

@@ -203,7 +203,7 @@ def test_a_couple_gives_no_stiffness():
 def test_study_takes_options():
     box()
     expect_ok(run("flexel", "study", "box.stl", "--material", "steel", "--fix", "xmin", "--torque", "xmax: 5 N m", "--probe",
-                  "tip: 40 10 10 mm", "--budget", "20 s", "-o", "study", timeout=110))
+                  "tip: 40 10 10 mm", "--budget", "8 s", "-o", "study", timeout=110))
     text = open("study/study-scene.toml").read()
     expect("torque" in text and "tip" in text and 'material = "steel"' in text.replace("'", '"'), text)
     scene("scene.toml")

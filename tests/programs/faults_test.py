@@ -151,7 +151,7 @@ def test_deform():
 
 def test_picture():
     bent()
-    sweep(("flexel", "picture", "bent.vtu", "-o", "p.png"), ("p.png",))
+    sweep(("flexel", "picture", "bent.vtu", "--size", "400x300", "-o", "p.png"), ("p.png",))
 
 
 def test_export():

@@ -200,9 +200,9 @@ def test_real_3mf_files_keep_all_they_have():
         expect_ok(run("flexel-voxelize", PARTS / file, *options, "-o", "rest.vtu"))
         expect_ok(run("flexel-map", "rest.vtu", "-o", "rest.3mf"))
         expect(open("rest.3mf", "rb").read() == (PARTS / file).read_bytes(), f"{file}: a part that did not move is the same file")
-        lift = run("flexel", "deform", PARTS / file, *options, "--material", "PLA", "--fix", "zmin", "--push", "zmax: 0 0 5 N", "--no-estimate",
-                   "--keep-vertices", "-o", "bent.3mf")
-        expect_ok(lift)
+        scene("lift.toml", 'material = "PLA"\n[[fix]]\nwhere = "zmin"\n[[load]]\nwhere = "zmax"\nforce = [0, 0, "5 N"]\n')
+        expect_ok(run("flexel-simulate", "lift.toml", "rest.vtu", "-o", "bent.vtu", "--no-estimate"))
+        expect_ok(run("flexel-map", "bent.vtu", "--keep-vertices", "-o", "bent.3mf"))
         before, old = read_3mf(PARTS / file)
         after, new = read_3mf("bent.3mf")
         expect([(n, len(v), t) for n, v, t in before] == [(n, len(v), t) for n, v, t in after] and len(after) == parts, file)

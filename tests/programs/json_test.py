@@ -74,7 +74,7 @@ def test_compensate_and_export():
 
 def test_study():
     box()
-    printed = parsed("study", "box.stl", *PULL[:-2], "-o", "study", "--budget", "10 s", "--json")
+    printed = parsed("study", "box.stl", *PULL[:-2], "-o", "study", "--budget", "8 s", "--json")
     expect(printed == json.loads(pathlib.Path("study/study.json").read_text()) and printed["program"] == "flexel study", "another study.json")
 
 

@@ -191,13 +191,13 @@ def test_the_page_says_what_the_table_holds():
 
 
 def test_a_given_reference_goes_before_the_extrapolation():
-    expect_ok(study("--reference", "tip=13 um", budget="12 s"))
+    expect_ok(study("--reference", "tip=13 um", budget="8 s"))
     (tip,) = [r for r in json.load(open("study/study.json"))["references"] if r["name"] == "tip"]
     expect(tip["value"] == 13e-6 and tip["uncertainty"] == 0 and tip["from"] == "given", f"{tip}")
 
 
 def test_the_page_is_one_file_that_fetches_nothing():
-    expect_ok(study(budget="12 s"))
+    expect_ok(study(budget="9 s"))
     page = parsed()
     expect(page.fetched == [] and page.scripts == 0, f"{page.fetched}")
     expect(len(page.ids) == len(set(page.ids)), "ids are unique")
@@ -214,11 +214,11 @@ def test_the_page_is_one_file_that_fetches_nothing():
 
 
 def test_the_budget_is_kept():
-    expect_ok(study())
+    expect_ok(study(budget="9 s"))
     took = sum(float(row["wall [s]"]) for row in rows_of())
-    expect(took < 12, f"the runs fit into 12 s: {took} s")
+    expect(took < 9, f"the runs fit into 9 s: {took} s")
     summary = json.load(open("study/study.json"))
-    expect(summary["spent"] < 12 + 8, f"the page is within it too, but for what a busy machine takes: {summary['spent']} s")
+    expect(summary["spent"] < 9 + 8, f"the page is within it too, but for what a busy machine takes: {summary['spent']} s")
     expect(summary["left_out"], "what did not fit is named")
     result = study(budget="10 ms")
     expect_error(result, "flexel", "--budget")
@@ -254,7 +254,7 @@ def test_a_study_that_is_stopped_leaves_the_earlier_one():
     for name, text in earlier.items():
         pathlib.Path("study", name).write_text(text)
     command = ("flexel", "study", "box.stl", "--material", "steel", "--fix", "xmin", "--push", "xmax: 0 0 -10 N", "--budget", "100 s", "-o",
-               "study", "--timeout", "6 s")
+               "study", "--timeout", "3 s")
     expect_error(run(*command), "flexel", "stopped by --timeout", code=5)
     expect_only(*earlier, folder="study")
     for name, text in earlier.items():
@@ -336,7 +336,7 @@ def test_a_study_that_cannot_begin_leaves_the_last_one():
 def test_without_gnuplot_the_page_says_so():
     box()
     environment = dict(os.environ, PATH="/nowhere")
-    result = expect_ok(run("flexel", "study", "box.stl", "--scene", scene(), "--budget", "12 s", "-o", "study", env=environment,
+    result = expect_ok(run("flexel", "study", "box.stl", "--scene", scene(), "--budget", "8 s", "-o", "study", env=environment,
                            timeout=110))
     expect("gnuplot is not installed" in result.err and "gnuplot-nox" in result.err, result.err)
     expect("gnuplot-nox" in parsed().text, "the page says it too")
@@ -374,7 +374,7 @@ def test_a_browser_opens_the_page():
     browser = next((shutil.which(name) for name in ("chromium", "chromium-browser", "google-chrome") if shutil.which(name)), None)
     if browser is None:
         raise Skip("no Chromium is installed")
-    expect_ok(study())
+    expect_ok(study(budget="8 s"))
     done = subprocess.run([browser, "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--v=0",
                            "--host-resolver-rules=MAP * ~NOTFOUND", "--user-data-dir=profile", "--print-to-pdf=page.pdf",
                            pathlib.Path("study/study.html").resolve().as_uri()], stderr=subprocess.PIPE, timeout=90, check=False)

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <array>
 #include <random>
 
 #include "base/parallel.h"
@@ -11,6 +12,7 @@
 #include "simulate/equilibrium/mechanics.h"
 #include "simulate/scene/effects.h"
 #include "simulate/scene/scene.h"
+#include "tests/sanitized.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/law_materials.h"
 #include "tests/simulate/numbered_body.h"
@@ -25,9 +27,11 @@ using testing::kGumYoung;
 
 // Two parts that touch, turned in space, with slivers and a hole, spacings that differ.
 Body two_boxes() {
+  const auto [along, wide, high] =
+      less_if_sanitized(std::array{19, 7, 6}, std::array{9, 4, 3}, "a sixth of the cells");
   BoxOptions near;
   near.name = "near";
-  near.cells = {19, 7, 6};
+  near.cells = {along, wide, high};
   near.spacing = Vec3(0.1, 0.11, 0.09);
   near.axes =
       (Eigen::AngleAxisd(0.5, Vec3::UnitX()) * Eigen::AngleAxisd(0.4, Vec3::UnitY())).toRotationMatrix();
@@ -36,8 +40,8 @@ Body two_boxes() {
   };
   BoxOptions far = near;
   far.name = "far";
-  far.cells = {5, 7, 6};
-  far.origin = near.axes * Vec3(19 * 0.1, 0, 0);
+  far.cells = {5, wide, high};
+  far.origin = near.axes * Vec3(along * 0.1, 0, 0);
   far.fill = {};
   Body body = box_body(near);
   append(body, box_body(far));

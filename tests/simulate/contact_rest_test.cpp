@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <map>
 
 #include "simulate/effects/contact.h"
@@ -197,6 +198,84 @@ TEST(Contact, APinThatFillsAHoleFeelsNothingUntilItIsPushed) {
     EXPECT_LT(at_rest, 1e-6 * pushed) << radius;
     EXPECT_LT(stored, 1e-6 * pushed * kPush) << radius;
   }
+}
+
+// N, on each element, when what overlaps at rest has been let out in `release` [s] (0: at once) and a part is moved by
+// `displacement` [m] of each of its elements.
+std::vector<Vec3> forces_let_out(const Body& body, double release, std::size_t part,
+                                 const std::function<Vec3(std::uint32_t)>& displacement) {
+  const Problem problem = problem_of(body);
+  ContactSettings settings = all_parts(body);
+  settings.release_time = release;
+  Contacts contacts(settings, problem);
+  State state = starting_at_rest(body);
+  std::vector<Vec3> forces(body.element_count(), Vec3::Zero());
+  contacts.add_forces(state, forces);
+  state.time = release;
+  for (std::uint32_t e = body.parts[part].element_begin; e < body.parts[part].element_end; ++e)
+    state.displacement[e] = displacement(e);
+  std::fill(forces.begin(), forces.end(), Vec3::Zero());
+  contacts.add_forces(state, forces);
+  return forces;
+}
+
+// Facets do not press, the interference does: as a pin that just fits and swells by as much, let out or at once.
+TEST(Contact, APressFitPressesByItsInterference) {
+  constexpr double kRelease = 0.01;  // s
+  // N, around the pin, which is wider by `interference` [m] at rest and swells by `swelling` [m].
+  const auto pressed = [](double radius, double interference, double swelling, double release) {
+    Body body = prism(block("plate", {12, 12, 4}, Vec3(-6 * kSide, -6 * kSide, -0.5 * kSide)), 40, 5 * kSide,
+                      radius, 0, 3 * kSide);
+    append(body, prism(block("pin", {8, 8, 8}, Vec3(-4 * kSide, -4 * kSide, -2.5 * kSide)), 40,
+                       radius + interference, 0, -1.2 * kSide, 4.1 * kSide));
+    const auto across = [&](std::uint32_t e) { return Vec3(body.rest[e].x(), body.rest[e].y(), 0); };
+    const std::vector<Vec3> forces = forces_let_out(
+        body, release, 1, [&](std::uint32_t e) -> Vec3 { return swelling / radius * across(e); });
+    double sum = 0;
+    for (std::uint32_t e = body.parts[1].element_begin; e < body.parts[1].element_end; ++e)
+      sum -= forces[e].dot(across(e).normalized());
+    return sum;
+  };
+  for (const double radius : {1.6 * kSide, 2.7 * kSide})
+    for (const double interference : {0.02 * kSide, 0.04 * kSide}) {
+      const double swollen = pressed(radius, 0, interference, 0);
+      EXPECT_GT(swollen, 0);
+      for (const double release : {0.0, kRelease}) {
+        EXPECT_NEAR(pressed(radius, interference, 0, release) / swollen, 1, 0.15)
+            << radius << " " << interference << " " << release;
+        EXPECT_LT(std::abs(pressed(radius, 0, 0, release)), 0.01 * swollen) << radius << " " << release;
+      }
+    }
+}
+
+// The tip of a screw presses a pin as one that comes from apart, beside a plate whose hole the pin fills: that fit is not its.
+TEST(Contact, WhatOverlapsAPinBesideItsHolePresses) {
+  constexpr double kRelease = 0.01, kRadius = 2.7 * kSide;  // s, m
+  // N, on the screw, which begins `depth` [m] in the pin and moves on by `way` [m].
+  const auto pressed = [](double width, double depth, double way, double release) {
+    Body body = prism(block("plate", {12, 12, 4}, Vec3(-6 * kSide, -6 * kSide, -0.5 * kSide)), 40, 5 * kSide,
+                      kRadius, 0, 3 * kSide);
+    append(body, prism(block("pin", {8, 8, 8}, Vec3(-4 * kSide, -4 * kSide, -2.5 * kSide)), 40, kRadius, 0,
+                       -1.2 * kSide, 4.1 * kSide));
+    const double tip = kRadius - depth, low = 3.05 * kSide;
+    std::vector<Vec3> vertices;
+    for (const double z : {low, low + width})
+      for (const auto& [x, y] : {std::pair{0.0, -0.5}, {3.0, -0.5}, {3.0, 0.5}, {0.0, 0.5}})
+        vertices.emplace_back(tip + x * kSide, y * width, z);
+    append(body, within_block(
+                     block("screw", {5, 4, 4}, Vec3(tip - 0.5 * kSide, -2 * kSide, 2.5 * kSide)), vertices,
+                     {{3, 2, 1, 0}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}}));
+    const Part& screw = body.parts[2];
+    const std::vector<Vec3> forces =
+        forces_let_out(body, release, 2, [&](std::uint32_t) { return Vec3(-way, 0, 0); });
+    double sum = 0;
+    for (std::uint32_t e = screw.element_begin; e < screw.element_end; ++e) sum += forces[e].x();
+    return sum;
+  };
+  for (const double width : {0.6 * kSide, kSide})
+    for (const double depth : {0.1 * kSide, 0.6 * kSide})
+      EXPECT_NEAR(pressed(width, depth, 0, kRelease) / pressed(width, 0, depth, 0), 1, 0.1)
+          << width << " " << depth;
 }
 
 // Its edge and its faces press, as those of one that comes from apart, but for pairs that come near when they are deep.

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "simulate/effects/gravity.h"
+#include "tests/sanitized.h"
 #include "tests/simulate/contact_case.h"
 
 namespace flexel::simulate {
@@ -42,7 +43,8 @@ std::vector<Vec3> forces_of(Contacts& contacts, const State& state) {
 TEST(ContactSchedule, WhatGoesOnFromACheckpointHasTheSameBits) {
   const Body body = three_blocks();
   const Problem problem = problem_of(body);
-  for (const unsigned seed : {1u, 2u, 3u}) {
+  for (const unsigned seed :
+       less_if_sanitized<std::vector<unsigned>>({1, 2, 3}, {1}, "one motion of three")) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> one(-1, 1);
     const auto vector = [&] { return Vec3(one(random), one(random), one(random)); };

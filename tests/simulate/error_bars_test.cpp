@@ -9,6 +9,7 @@
 
 #include "simulate/estimate/stress_singularity.h"
 #include "simulate/result/estimate.h"
+#include "tests/sanitized.h"
 #include "tests/simulate/study_beam.h"
 
 namespace flexel::simulate {
@@ -110,7 +111,7 @@ TEST(StressBar, HoldsTheLimitOrThereIsNone) {
 
 // Coarse cells put the largest stress some way from the clamp, where three values may seem to close in.
 TEST(ErrorBars, TheStressAtAClampHasNoneAtAnySpacing) {
-  for (const int n : {6, 8, 12, 16}) {
+  for (const int n : less_if_sanitized<std::vector<int>>({6, 8, 12, 16}, {6, 8}, "two spacings of four")) {
     const SimulateResult result = end_loaded(testing::corner_beam(n), testing::held_beam("cells"));
     ASSERT_TRUE(result.error_bars.von_mises.has_value()) << result.error_bars.note;
     EXPECT_EQ(result.error_bars.von_mises->value[0], result.stress->value);

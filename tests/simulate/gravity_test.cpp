@@ -205,7 +205,7 @@ TEST(MutualGravity, LargeBlocksFallByTheTree) {
   options.cells = {30, 10, 10};
   options.spacing = Vec3::Constant(0.1);
   options.fill = [](int i, int, int) { return i < 10 || i >= 20 ? 1.0 : 0.0; };
-  const double time = less_if_sanitized(0.4, 0.1, "a quarter of the time");
+  const double time = less_if_sanitized(0.4, 0.04, "a tenth of the time");
   Scene scene = gravity_scene(time, 0.004);
   scene.get<Gravity>().mutual = true;
   const TimedCase made = run_timed(testing::box_body(options), scene);

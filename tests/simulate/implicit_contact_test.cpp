@@ -180,7 +180,8 @@ TEST(ImplicitContact, WhatRestsIsWhereExplicitStepsLeaveIt) {
     const TimedCase by_steps = run_timed(body, scene);
     const double sag = farthest(by_steps.body.position, by_steps.body.rest);
     ASSERT_GT(sag, 1e-4 * kSide);
-    for (const double step : {1e-3, 5e-3}) {
+    for (const double step :
+         less_if_sanitized<std::vector<double>>({1e-3, 5e-3}, {5e-3}, "one step of two")) {
       const TimedCase made = run_timed(body, implicit(scene, step));
       EXPECT_LT(farthest(made.body.position, by_steps.body.position), share * sag)
           << model << friction << step;
@@ -307,7 +308,7 @@ Press press(const std::function<Scene(Scene)>& steps) {
 TEST(ImplicitContact, AToolPressesAsInExplicitSteps) {
   const Press by_steps = press([](Scene scene) { return scene; });
   ASSERT_LT(by_steps.force.z(), -1);
-  for (const double step : {1e-3, 5e-3}) {
+  for (const double step : less_if_sanitized<std::vector<double>>({1e-3, 5e-3}, {5e-3}, "one step of two")) {
     const Press made = press([&](Scene scene) { return implicit(std::move(scene), step); });
     EXPECT_LT((made.force - by_steps.force).norm(), 0.01 * by_steps.force.norm()) << step;
     EXPECT_LT((made.torque - by_steps.torque).norm(), 0.02 * by_steps.torque.norm()) << step;

@@ -316,7 +316,10 @@ TEST(ImplicitEuler, EffortIsThatOfAllActs) {
   scene.get<Supports>().ties.push_back(make_fix(select_by_name("x0")));
   scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
   const TimedCase whole = testing::run_timed(small_box(), scene);
-  Event nothing{0.02, "nothing", "", {}, [](EventContext&) { return std::string(); }};
+  Event nothing;
+  nothing.at = 0.02;
+  nothing.name = "nothing";
+  nothing.apply = [](EventContext&) { return std::string(); };
   scene.events.push_back(nothing);
   const TimedCase parted = testing::run_timed(small_box(), scene);
   EXPECT_GT(parted.result.newton_iterations, 0.8 * whole.result.newton_iterations);

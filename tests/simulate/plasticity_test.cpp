@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "simulate/scene/scene.h"
+#include "tests/sanitized.h"
 #include "tests/scratch.h"
 #include "tests/simulate/stepped.h"
 #include "tests/simulate/timed_case.h"
@@ -66,7 +67,7 @@ time = "3 ms"
 )";
 
 TEST(Plasticity, BarKeepsItsSet) {
-  for (const int n : {1, 2, 3}) {
+  for (const int n : less_if_sanitized<std::vector<int>>({1, 2, 3}, {2}, "one lattice of three")) {
     Body body = box_of({3 * n, n, n}, 2e-3 / n);
     const Scene scene = parse_scene(kYieldingBar, "bar.toml");
     SimulateOptions options;
@@ -93,7 +94,7 @@ TEST(Plasticity, BarKeepsItsSet) {
 
 // Model springs flows as the material does: the same closed form.
 TEST(Plasticity, SpringsKeepTheirSet) {
-  for (const int n : {1, 2, 3}) {
+  for (const int n : less_if_sanitized<std::vector<int>>({1, 2, 3}, {2}, "one lattice of three")) {
     Body body = box_of({3 * n, n, n}, 2e-3 / n);
     std::string text = std::string(kYieldingBar) + "[parts.box]\nmodel = \"springs\"\n";
     text.replace(text.find("poisson = 0.3"), 13, "poisson = 0.25");

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "tests/sanitized.h"
 #include "tests/voxelize/damage.h"
 #include "voxelize/classify/inside_consensus.h"
 #include "voxelize/classify/winding.h"
@@ -193,7 +194,7 @@ TEST(Heal, EdgesOfManyTrianglesAreNotCalledOpen) {
   EXPECT_THAT(message, testing::HasSubstr("4 edges where more than two triangles meet"));
   EXPECT_THAT(message, testing::Not(testing::HasSubstr("open edge")));
   EXPECT_THAT(message, testing::EndsWith("take a wrap of it: --heal wrap"));
-  EXPECT_GT(total_volume(run_healed(cells, .1, Heal::wrap)), 1);  // as advised
+  EXPECT_GT(total_volume(run_healed(cells, .2, Heal::wrap)), 1);  // as advised
 }
 
 // All that is wrong, in one go.
@@ -265,9 +266,11 @@ TEST(Heal, NoneTakesTheSurfaceAsItIs) {
 // 1 %.
 TEST(Heal, DamageIsHealedOrRefused) {
   const Mesh meshes[] = {torus(1, .3, 96, 48), merged(icosphere(3, 1), inverted(icosphere(2, .6)))};
+  const bool both = less_if_sanitized(true, false, "each damage is done to one mesh of two");
   for (int trial = 0; trial < 2 * kDamageCount; ++trial) {
     const Mesh& mesh = meshes[trial % 2];
     const int kind = trial / 2;
+    if (!both && kind % 2 != trial % 2) continue;
     for (const double degree : {0., .6}) {
       const Mesh broken = Damager(mesh, static_cast<unsigned>(trial)).damaged(kind, degree);
       try {

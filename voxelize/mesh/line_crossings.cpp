@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "base/parallel.h"
 
@@ -100,6 +101,26 @@ void cross_triangle_lines(const PartMesh& mesh, const std::vector<Vec3>& points,
     cross_row(t, grid.v_begin + b * grid.v_step, b, grid, triangle, out);
 }
 
+// A line has few crossings: they are counted into their lines, and each line is sorted by itself.
+std::vector<LineCrossing> sorted_by_line(const std::vector<std::vector<LineCrossing>>& found,
+                                         std::size_t lines) {
+  std::vector<std::uint32_t> next(lines + 1, 0);  // where the next crossing of a line goes
+  for (const auto& part : found)
+    for (const LineCrossing& crossing : part) ++next[crossing.line + 1];
+  std::partial_sum(next.begin(), next.end(), next.begin());
+  std::vector<LineCrossing> crossings(next.back());
+  for (const auto& part : found)
+    for (const LineCrossing& crossing : part) crossings[next[crossing.line]++] = crossing;
+  parallel_for_each(lines, [&](std::size_t line) {  // next[line] is where the line ends now
+    const auto begin = static_cast<std::ptrdiff_t>(line == 0 ? 0 : next[line - 1]);
+    std::sort(crossings.begin() + begin, crossings.begin() + static_cast<std::ptrdiff_t>(next[line]),
+              [](const LineCrossing& a, const LineCrossing& b) {
+                return a.at != b.at ? a.at < b.at : a.triangle < b.triangle;
+              });
+  });
+  return crossings;
+}
+
 }  // namespace
 
 std::vector<LineCrossing> cross_lines(const PartMesh& mesh, const std::vector<Vec3>& points,
@@ -113,13 +134,8 @@ std::vector<LineCrossing> cross_lines(const PartMesh& mesh, const std::vector<Ve
                            triangles.empty() ? static_cast<std::uint32_t>(t) : triangles[t],
                            found[begin / kGrain]);
   });
-  std::vector<LineCrossing> crossings;
-  for (const auto& part : found) crossings.insert(crossings.end(), part.begin(), part.end());
-  parallel_sort(crossings.begin(), crossings.end(), [](const LineCrossing& a, const LineCrossing& b) {
-    if (a.line != b.line) return a.line < b.line;
-    return a.at != b.at ? a.at < b.at : a.triangle < b.triangle;
-  });
-  return crossings;
+  return sorted_by_line(found,
+                        static_cast<std::size_t>(grid.u_count) * static_cast<std::size_t>(grid.v_count));
 }
 
 }  // namespace flexel::voxelize

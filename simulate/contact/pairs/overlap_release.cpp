@@ -38,8 +38,9 @@ std::uint32_t OverlapRelease::later_part(const ContactPair& pair) const {
 }
 
 double OverlapRelease::allowed(const ContactPair& pair, const PairRecord& record) const {
-  return record.penetration > 0 && !shares_.empty() ? shares_[later_part(pair)] * record.penetration
-                                                    : pair.rest_overlap;
+  const double released = record.penetration - pair.rest_overlap;
+  return released > 0 && !shares_.empty() ? pair.rest_overlap + shares_[later_part(pair)] * released
+                                          : pair.rest_overlap;
 }
 
 // Of a pair's first point: a part, or numbered behind them a plane.
@@ -72,7 +73,7 @@ void OverlapRelease::admit(const std::vector<std::uint32_t>& pairs, const std::v
     double penetration = known(pair.i, other);
     if (!pair.of_plane()) deepen(penetration, known(pair.j, part));
     const bool far = depths[n] - share * penetration > kKeepsPressing * list_.point(pair.i).width;
-    if (penetration == 0 || far) penetration = depths[n] / share;
+    if (penetration == 0 || far) penetration = pair.rest_overlap + (depths[n] - pair.rest_overlap) / share;
     deepen(memory[pairs[n]].penetration, penetration);
   }
 }
@@ -81,9 +82,11 @@ void OverlapRelease::enter_energy(const std::vector<double>& before, const std::
                                   const std::vector<PairState>& states, const PairMemory& memory) {
   if (shares_.empty() || before == shares_) return;
   std::vector<double> pressing(shares_.size(), 0);
-  for (const std::uint32_t p : active)
-    if (memory[p].penetration > 0)
-      pressing[later_part(list_.pairs()[p])] += states[p].pressure * memory[p].penetration;
+  for (const std::uint32_t p : active) {
+    const ContactPair& pair = list_.pairs()[p];
+    pressing[later_part(pair)] +=
+        states[p].pressure * std::max(memory[p].penetration - pair.rest_overlap, 0.0);
+  }
   for (std::size_t p = 0; p < before.size(); ++p)  // none the first time
     energy_ += 0.5 * (before[p] - shares_[p]) * (pressing_[p] + pressing[p]);
   pressing_ = std::move(pressing);

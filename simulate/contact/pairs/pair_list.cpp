@@ -7,37 +7,15 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kSkin = 0.4;         // margin, of the widest spacing
-constexpr double kSlack = 0.45;       // of the margin; not quite half: weights may lie outside [0, 1]
-constexpr double kTurning = 0.4;      // by which the cosine between normals may change meanwhile
-constexpr double kOpposite = 0.9998;  // cosine of 1 degree, from which faces are as parts of one plane
-constexpr double kBendReach = 3;      // spacings, within which a curved surface turns; its facets may be long
+constexpr double kSkin = 0.4;     // margin, of the widest spacing
+constexpr double kSlack = 0.45;   // of the margin; not quite half: weights may lie outside [0, 1]
+constexpr double kTurning = 0.4;  // by which the cosine between normals may change meanwhile
 
 // m, at most, between positions of two points that touch.
 double touching_distance(const ContactPoint& a, const ContactPoint& b) {
   if (a.radius > 0 && b.radius > 0) return a.radius + b.radius;
   const double width = std::max(a.width, b.width), depth = a.depth + b.depth + a.radius + b.radius;
   return std::sqrt(width * width + depth * depth);  // hypot() takes ten times as long
-}
-
-// (points) 1: a face beside which its part's surface turns by up to 60 degrees, as what is curved does, and not
-// at an edge: beyond it, its plane is not the surface.
-std::vector<std::uint8_t> curved_faces(const ContactSurface& surface) {
-  constexpr double kMeets = 0.5;  // cosine of 60 degrees
-  const std::vector<ContactPoint>& points = surface.points();
-  std::vector<Vec3> at;
-  for (const ContactPoint& point : points) at.push_back(point.rest);
-  const Neighbours turned =
-      neighbours_within(at, kBendReach * surface.widest(), [&](std::uint32_t i, std::uint32_t j) {
-        const ContactPoint &a = points[i], &b = points[j];
-        const double cosine = a.normal.dot(b.normal);
-        return a.part == b.part && a.shape == ContactShape::face && b.shape == ContactShape::face &&
-               cosine < kOpposite && cosine > kMeets;
-      });
-  std::vector<std::uint8_t> curved(points.size(), 0);
-  for (std::uint32_t i = 0; i < points.size(); ++i)
-    for (const std::uint32_t j : turned.of(i)) curved[i] = curved[j] = 1;
-  return curved;
 }
 
 }  // namespace
@@ -47,12 +25,10 @@ PairList::PairList(const ContactSettings& settings, const Problem& problem, cons
       surface_(surface),
       materials_(settings, problem, surface),
       excluded_(settings, problem, surface),
+      rest_overlaps_(settings, surface, materials_, excluded_),
       surface_runs_(element_runs(surface.elements(), surface.body().parts)),
       built_at_(surface.elements().size()),
-      skin_(kSkin * surface.widest()) {
-  const auto several = std::count(settings.parts.begin(), settings.parts.end(), 1) > 1;
-  if (several && !(settings.release_time > 0)) curved_ = curved_faces(surface);
-}
+      skin_(kSkin * surface.widest()) {}
 
 bool PairList::update(const State& state, bool ahead) {
   if (!is_due(state, ahead)) return false;
@@ -185,28 +161,6 @@ bool PairList::may_touch(std::uint32_t i, std::uint32_t j, const std::vector<Vec
   return !excluded_.contains(i, j);
 }
 
-// Of curved surfaces that fit each other, which patches show as facets. What overlaps a flat face presses, at
-// any angle, and so does what faces the other squarely. A face has its plane alone: the rim of a hole is behind
-// the planes of the patches beside it on the pin, within a spacing and at up to 60 degrees; beyond `hard` such
-// a pair exerts no force (PairPhase::penetrated).
-double PairList::rest_overlap(std::uint32_t i, std::uint32_t j, const PairConstants& constants) const {
-  constexpr double kBending = 0.6;  // tangent of half of 60 degrees and a little
-  const ContactPoint &a = surface_.points()[i], &b = surface_.points()[j];
-  const bool balls = a.shape == ContactShape::ball || b.shape == ContactShape::ball;
-  if (a.part == b.part || balls || curved_.empty() || !(curved_[i] || curved_[j])) return 0;
-  const ContactSide of_a = surface_.at(i, Vec3::Zero(), CellShape{}).side,
-                    of_b = surface_.at(j, Vec3::Zero(), CellShape{}).side;
-  const PairState rest = pair_state(of_a, of_b, constants);
-  if (!rest.near || rest.deep || !(rest.gap < 0) || -of_a.normal.dot(of_b.normal) > kOpposite) return 0;
-  const double opposite = std::clamp(-of_a.normal.dot(of_b.normal), 0.0, 1.0);
-  const bool edge = a.shape == ContactShape::edge || b.shape == ContactShape::edge;
-  const double bending =
-      edge ? kBending : std::sqrt((1 - opposite) / (1 + opposite));  // tan of half the angle
-  const double most = std::min(kTouchingDepth * std::min(a.width, b.width) + bending * rest.offset.norm(),
-                               constants.law.hard);
-  return -rest.gap <= most ? -rest.gap : 0;
-}
-
 void PairList::add_pairs(const std::vector<Vec3>& positions, const std::vector<Vec3>& normals) {
   const double widest = surface_.widest();
   double farthest = 0;  // that any two points touch over
@@ -225,7 +179,7 @@ void PairList::add_pairs(const std::vector<Vec3>& positions, const std::vector<V
       const std::uint32_t i = in_grid[a], j = in_grid[b];
       const PairProperties properties = materials_.between(i, j);
       pairs_.push_back(
-          {i, j, 0, std::uint64_t{i} << 32 | j, properties, rest_overlap(i, j, properties.constants)});
+          {i, j, 0, std::uint64_t{i} << 32 | j, properties, rest_overlaps_.of(i, j, properties.constants)});
     }
 }
 

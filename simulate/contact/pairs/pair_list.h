@@ -5,7 +5,7 @@
 #pragma once
 #include "simulate/contact/pairs/contact_materials.h"
 #include "simulate/contact/pairs/element_runs.h"
-#include "simulate/contact/pairs/excluded_pairs.h"
+#include "simulate/contact/pairs/rest_overlaps.h"
 
 namespace flexel::simulate {
 
@@ -15,8 +15,7 @@ struct ContactPair {
   std::uint32_t plane = 0;
   std::uint64_t key = 0;  // contact points, i << 32 | j; a plane is numbered behind the last point
   PairProperties properties;
-  // m, penetration at rest of two parts that presses nothing: where curved surfaces touch, their patches overlap. 0 where
-  // initial penetrations are released.
+  // m, penetration at rest of two parts that presses nothing (simulate/contact/pairs/rest_overlaps.h)
   double rest_overlap = 0;
 
   [[nodiscard]] bool of_plane() const { return j == kOfPlane; }
@@ -64,7 +63,6 @@ class PairList {
                                                                 double farthest);
   [[nodiscard]] bool may_touch(std::uint32_t i, std::uint32_t j, const std::vector<Vec3>& positions,
                                const std::vector<Vec3>& normals) const;
-  [[nodiscard]] double rest_overlap(std::uint32_t i, std::uint32_t j, const PairConstants& constants) const;
   void add_pairs(const std::vector<Vec3>& positions, const std::vector<Vec3>& normals);
   void add_plane_pairs(const std::vector<Vec3>& positions, const std::vector<Vec3>& normals);
   void number_points();
@@ -73,7 +71,7 @@ class PairList {
   const ContactSurface& surface_;
   ContactMaterials materials_;
   ExcludedPairs excluded_;
-  std::vector<std::uint8_t> curved_;  // (surface points) 1: a face of a curved surface; empty: none is asked
+  RestOverlaps rest_overlaps_;
   std::vector<ContactPair> pairs_;
   std::vector<std::uint32_t> points_, elements_;
   std::vector<ElementRun> runs_, surface_runs_;  // of elements_; of all that carry points

@@ -1,16 +1,13 @@
 // Numbers are written so that they come back to the bit.
 #include "simulate/contact/pairs/stuck_places.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <span>
 #include <string_view>
 
-#include "base/error.h"
 #include "base/files/append_text.h"
+#include "formats/common/note_text.h"
 #include "simulate/contact/pairs/pair_memory.h"
 
 namespace flexel::simulate {
@@ -23,12 +20,8 @@ bool names_part(double number, const Body& body) {
 }
 
 bool parse_places(std::string_view line, const Body& body, StuckPlaces& places) {
-  for (double& value : places) {
-    const auto [rest, error] = std::from_chars(line.data(), line.data() + line.size(), value);
-    line.remove_prefix(static_cast<std::size_t>(rest - line.data()));
-    if (error != std::errc() || !std::isfinite(value) || line.empty() || line.front() != ' ') return false;
-    line.remove_prefix(1);
-  }
+  for (double& value : places)
+    if (!take_number(line, value, ' ') || !std::isfinite(value)) return false;
   const double phase = places[kPhase];
   return line.empty() && names_part(places[kOnePart], body) &&
          (places[kOtherPart] == -1 || names_part(places[kOtherPart], body)) &&
@@ -41,13 +34,8 @@ std::vector<StuckPlaces> stuck_places(const Body& body) {
   std::vector<StuckPlaces> all;
   const auto note = body.notes.find(kStuckNote);
   if (note == body.notes.end()) return all;
-  std::string_view text = note->second;
-  while (!text.empty()) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
-    if (!parse_places(text.substr(0, end), body, all.emplace_back()))
-      throw InputError(fmt::format("the body's note \"{}\" is damaged in line {}", kStuckNote, all.size()));
-    text.remove_prefix(std::min(end + 1, text.size()));
-  }
+  read_note_rows(note->second, kStuckNote,
+                 [&](std::string_view line) { return parse_places(line, body, all.emplace_back()); });
   return all;
 }
 

@@ -1,9 +1,10 @@
-// Held regions that matter goes on beside, and their widths.
+// Held and loaded regions that matter goes on beside, their widths, and how far loads sink in there.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "simulate/effects/loads.h"
 #include "simulate/effects/supports.h"
-#include "simulate/estimate/narrow_support.h"
+#include "simulate/estimate/narrow_region.h"
 
 namespace flexel::simulate {
 namespace {
@@ -60,17 +61,23 @@ TEST(NarrowSupport, WhatIsHeldBesideItGivesNoWay) {
   EXPECT_DOUBLE_EQ(width_amid_matter(squares(0), {3}, strip).value(), 0.5);  // flush along two of its edges
 }
 
-TEST(NarrowSupport, IsToldByWhatItIs) {
+// The squares at one height, the middle one a face of its own.
+Body plate(double spacing) {
   Body body;
   body.surface = squares(0);
-  body.surface.faces = {{"", 0}};
+  body.surface.faces = {{"", 0}, {"", 0}};
+  body.surface.polygon_face = {0, 0, 0, 0, 1, 0, 0, 0, 0};
   body.surface.parts = {{"plate"}};
   Part part;
   part.name = "plate";
-  part.lattice.spacing = Vec3::Constant(0.4);
+  part.material = "steel";
+  part.lattice.spacing = Vec3::Constant(spacing);
   body.parts = {part};
-  body.surface.polygon_face = {0, 0, 0, 0, 1, 0, 0, 0, 0};
-  body.surface.faces.push_back({"", 0});
+  return body;
+}
+
+TEST(NarrowSupport, IsToldByWhatItIs) {
+  Body body = plate(0.4);
   Scene scene;
   Tie tie;
   tie.where = select_by_name("plate/2");
@@ -87,6 +94,53 @@ TEST(NarrowSupport, IsToldByWhatItIs) {
   tie.where = select_by_name("plate/1");
   scene.get<Supports>().ties.push_back(tie);
   EXPECT_EQ(support_under_two_cells(body, scene), "") << "all around it is held too";
+}
+
+TEST(NarrowLoad, SinksInAsIntoAHalfSpaceAsFarAsItsCellsSpreadIt) {
+  const auto found = [](double spacing, const Load& load) {
+    Scene scene;
+    scene.material = "steel";
+    scene.get<Loads>().loads = {load};
+    return indentations_under_two_cells(plate(spacing), scene);
+  };
+  Load load;
+  load.where = select_by_name("plate/2");
+  load.name = "thumb";
+  load.force = Vec3(0, 3e6, -4e6);
+  const Material& steel = *library_material("steel");
+  const double on_half_space = 1.122 * (1 - steel.poisson * steel.poisson) * 5e6 / steel.young;
+  for (const double spacing : {0.3, 0.5, 20.0}) {
+    const auto depths = found(spacing, load);
+    ASSERT_EQ(depths.size(), 1) << spacing;
+    EXPECT_EQ(depths[0].load, "thumb");
+    EXPECT_EQ(depths[0].polygons, std::vector<std::uint32_t>{4});
+    EXPECT_DOUBLE_EQ(depths[0].width, 0.5);
+    EXPECT_NEAR(depths[0].depth, on_half_space * spacing / (0.5 + spacing), 1e-12 * on_half_space);
+  }
+  EXPECT_TRUE(found(0.25, load).empty()) << "two cells";
+  Load pressure = load;
+  pressure.force.reset();
+  pressure.pressure = -5e6;  // on 1 m^2
+  EXPECT_NEAR(found(0.5, pressure).at(0).depth, on_half_space / 2, 1e-12 * on_half_space);
+  Load couple = load;
+  couple.force.reset();
+  couple.torque = Vec3(0, 0, 1);
+  EXPECT_TRUE(found(0.5, couple).empty());
+  // Several loads on it act together; what is pushed beside it by less goes on.
+  Scene two;
+  two.material = "steel";
+  Load beside = load;
+  beside.where = select_by_name("plate/1");
+  beside.force = Vec3(0, 0, -8e6);  // on 8 m^2
+  two.get<Loads>().loads = {load, load, beside};
+  const auto together = indentations_under_two_cells(plate(0.5), two);
+  ASSERT_EQ(together.size(), 1);
+  EXPECT_NEAR(together[0].depth, 2 * on_half_space / 2, 1e-12 * on_half_space);
+  *two.get<Loads>().loads[2].force *= 6;
+  EXPECT_TRUE(indentations_under_two_cells(plate(0.5), two).empty());
+  load.where.kind = Selection::Kind::any_of;
+  load.where.members = {select_by_name("plate/1"), select_by_name("plate/2")};
+  EXPECT_TRUE(found(0.5, load).empty()) << "nothing goes on beside it";
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Held regions that the lattice does not resolve.
+// Held and loaded regions that the lattice does not resolve.
 #pragma once
 #include <optional>
 #include <string>
@@ -21,5 +21,19 @@ namespace flexel::simulate {
 // in words; "" for none. How far such a support gives way comes slowly to its limit, while values on three lattices seem to close
 // in on another.
 [[nodiscard]] std::string support_under_two_cells(const Body& body, const Scene& scene);
+
+// How far the surface gives way under a force or a pressure on such a region, as far as cells that wide spread it.
+struct UnresolvedIndentation {
+  std::string load;                     // its name
+  std::vector<std::uint32_t> polygons;  // that it acts on, ascending
+  double width = 0;                     // m, width_amid_matter()
+  // m, of the centre of a square of that area on a half-space under an even pressure, 1.122 (1 - nu^2) F / (E sqrt(area))
+  // (Love, Phil. Trans. R. Soc. A 228, 1929), times spacing / (width + spacing)
+  double depth = 0;
+};
+
+// Of the forces and pressures on faces, groups and sides whose regions are under two cells wide.
+[[nodiscard]] std::vector<UnresolvedIndentation> indentations_under_two_cells(const Body& body,
+                                                                              const Scene& scene);
 
 }  // namespace flexel::simulate
