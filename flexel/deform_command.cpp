@@ -36,6 +36,7 @@
 #include "mapping/report/report.h"
 #include "simulate/answer.h"
 #include "simulate/input/infill.h"
+#include "simulate/matter/voxel_pieces.h"
 #include "simulate/quadratic/quadratic_run.h"
 #include "simulate/result/options.h"
 #include "simulate/result/overload.h"
@@ -223,6 +224,8 @@ void plan_refinement(Plan& plan) {
 void refuse_closer_look(const DeformArguments& arguments, const Plan& plan) {
   if (arguments.closer && !simulate::asks_for_quadratic(plan.job.scene))
     throw InputError("--refine-stress is for model \"quadratic\": add --model quadratic");
+  if (arguments.closer && !arguments.within.empty())
+    throw InputError("--refine-stress takes time of its own: leave --within out");
 }
 
 Plan make_plan(const DeformArguments& arguments, const CommandLine& app) {
@@ -264,22 +267,18 @@ std::vector<mapping::CadAnswer> write_outputs(const DeformArguments& arguments, 
   return answers;
 }
 
-// The largest stress is looked at closer where that is asked for, or an accuracy. `body`: that the run is given.
+// What the largest stress is looked at closer with, where that is asked for. `body`: that the run is given.
 simulate::CutBox cut_box(const DeformArguments& arguments, const Plan& plan, const Body& body) {
-  if (!simulate::asks_for_quadratic(plan.job.scene) || (!arguments.closer && arguments.accuracy.empty()))
-    return {};
+  if (!arguments.closer) return {};
   const auto voxelizer = std::make_shared<std::optional<voxelize::BoxVoxelizer>>();
-  return [voxelizer, &body, heal = plan.job.voxelize.heal](const LatticeBox& box) {
+  return [voxelizer, &body, heal = plan.job.voxelize.heal](const simulate::LatticeBox& box) {
     if (!*voxelizer) voxelizer->emplace(body.surface, heal);
-    return (**voxelizer)(box);
+    return (**voxelizer)(box.lattice, box.lower, box.upper);
   };
 }
 
-simulate::SimulateOptions simulate_options(const DeformArguments& arguments, const Plan& plan,
-                                           const Body& body) {
+simulate::SimulateOptions simulate_options(const DeformArguments& arguments, const Plan& plan) {
   simulate::SimulateOptions options;
-  options.cut_box = cut_box(arguments, plan, body);
-  options.must_cut_box = arguments.closer;
   options.threads = arguments.threads;
   options.failed_output = failed_name(plan);
   options.estimate = arguments.estimate;
@@ -513,7 +512,7 @@ class GoalRuns {
     }
     const double processor = processor_seconds();
     Job job = plan_.job;  // anew for each body: an action that throws leaves none out
-    simulate::SimulateOptions asked = simulate_options(arguments_, plan_, run.voxels.body);
+    simulate::SimulateOptions asked = simulate_options(arguments_, plan_);
     if (solved_) asked.failed_output.clear();  // there is a result
     ++tries_;
     try {
@@ -573,6 +572,28 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
   return run;
 }
 
+// The run that was chosen again, with a closer look at its largest stress. Its bars stay, which other sizes may have widened.
+SolvedRun with_closer_look(const DeformArguments& arguments, const Plan& plan, const Surface& surface,
+                           SolvedRun chosen, Progress& progress) {
+  HeldWarnings told;  // by the run that was chosen
+  progress.stage("largest stress");
+  Progress inner("flexel", Progress::Mode::quiet);
+  voxelize::VoxelizeOptions how = plan.job.voxelize;
+  how.size = chosen.size;
+  const simulate::ErrorBars bars = std::move(chosen.simulated.error_bars);
+  chosen.voxels = voxelize::voxelize(surface, how, inner);
+  Job job = plan.job;
+  add_actions(job, chosen.voxels.body);
+  simulate::SimulateOptions asked = simulate_options(arguments, plan);
+  asked.cut_box = cut_box(arguments, plan, chosen.voxels.body);
+  chosen.simulated = simulate::simulate(chosen.voxels.body, job.scene, asked, inner);
+  std::optional<simulate::StressBar> stress = chosen.simulated.error_bars.von_mises;
+  chosen.simulated.error_bars = bars;
+  chosen.simulated.error_bars.von_mises = std::move(stress);
+  (void)told.take();
+  return chosen;
+}
+
 Surface read_part_files(const DeformArguments& arguments, const Plan& plan, Progress& progress) {
   if (arguments.part != nullptr) return *arguments.part;
   const StopEndsProcess at_once;
@@ -585,9 +606,13 @@ SolvedRun solve(const DeformArguments& arguments, Plan& plan, std::optional<Accu
   progress.stage("import");
   Surface surface = read_part_files(arguments, plan, progress);
   check_parts(plan.job, surface);
+  if (arguments.closer && surface.parts.size() > 1)
+    throw InputError(fmt::format("--refine-stress is for one part, and there are {}", surface.parts.size()));
   if (plan.goal) {
     progress.stage("choose the size");
-    return solve_to_goal(arguments, plan, surface, accuracy.emplace(), progress);
+    SolvedRun run = solve_to_goal(arguments, plan, surface, accuracy.emplace(), progress);
+    return arguments.closer ? with_closer_look(arguments, plan, surface, std::move(run), progress)
+                            : std::move(run);
   }
   SolvedRun run;
   {
@@ -596,8 +621,9 @@ SolvedRun solve(const DeformArguments& arguments, Plan& plan, std::optional<Accu
   }
   voxelize::report(run.voxels, progress);
   add_actions(plan.job, run.voxels.body);
-  run.simulated = simulate::simulate(run.voxels.body, plan.job.scene,
-                                     simulate_options(arguments, plan, run.voxels.body), progress);
+  simulate::SimulateOptions asked = simulate_options(arguments, plan);
+  asked.cut_box = cut_box(arguments, plan, run.voxels.body);
+  run.simulated = simulate::simulate(run.voxels.body, plan.job.scene, asked, progress);
   use_field(run.voxels.body, arguments.map, plan.map);
   return run;
 }

@@ -347,12 +347,9 @@ ErrorBars bars_at_rest(Body& body, const Scene& scene, const SimulateOptions& op
 void prefer_local_stress(bool estimate, SimulateResult& result) {
   if (!result.local_stress) return;
   const LocalStress& local = *result.local_stress;
+  if (!result.stress->beside.empty()) return;  // it is of a peak elsewhere
   result.stress = local.stress;
   if (!estimate) return;
-  if (local.values.empty()) {
-    if (result.error_bars.von_mises && !local.beside.empty()) result.error_bars.von_mises->bar.reset();
-    return;
-  }
   const std::size_t last = local.values.size() - 1;
   result.error_bars.von_mises = {{local.values[0], local.values[std::min<std::size_t>(1, last)],
                                   local.values[std::min<std::size_t>(2, last)]},

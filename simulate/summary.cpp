@@ -10,6 +10,7 @@
 #include "base/units.h"
 #include "base/version.h"
 #include "simulate/probes/report.h"
+#include "simulate/quadratic/local_stress.h"
 #include "simulate/result/result.h"
 #include "simulate/summary.h"
 
@@ -87,18 +88,23 @@ std::string local_stress_line(const SimulateResult& result) {
   const LocalStress& local = *result.local_stress;
   std::string line = fmt::format("looked at closer at {} place(s), {} cells in {:.1f} s", local.places,
                                  human_count(local.cells), local.seconds);
-  if (local.values.empty()) return line + ": the largest stress lies elsewhere";
   std::vector<std::string> values;
   for (auto each = local.values.rbegin(); each != local.values.rend(); ++each)
     values.push_back(human_pressure(*each));
-  return line + fmt::format(": {} down to cells of {}", fmt::join(values, ", "), human_length(local.spacing));
+  line += fmt::format(": {} down to cells of {}", fmt::join(values, ", "), human_length(local.spacing));
+  if (result.stress->beside.empty() || !local.stress.beside.empty()) return line;
+  return line +
+         fmt::format(
+             "; this is the largest some {} and more from supports, bonds and sharp edges, {}{}, at {}",
+             human_length(clear_of_singular(local)), human_pressure(local.stress.value),
+             local.bar ? " +- " + human_pressure(local.bar->half_width) : "", lengths(local.stress.at));
 }
 
 Json local_stress_json(const LocalStress& local) {
-  return {{"values", local.values},
-          {"spacing", local.spacing},
-          {"places", local.places},
-          {"cells", local.cells},
+  return {{"value", local.stress.value},   {"bar", local.bar ? Json(local.bar->half_width) : Json()},
+          {"at", vector(local.stress.at)}, {"clear_of_singular", clear_of_singular(local)},
+          {"values", local.values},        {"spacing", local.spacing},
+          {"places", local.places},        {"cells", local.cells},
           {"seconds", local.seconds}};
 }
 

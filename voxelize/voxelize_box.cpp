@@ -37,16 +37,15 @@ BoxVoxelizer::BoxVoxelizer(const Surface& surface, const HealChoice& how) : surf
                      "\": its surface is not closed, and exact moments need it to be");
 }
 
-Body BoxVoxelizer::operator()(const LatticeBox& box) const {
+Body BoxVoxelizer::operator()(const Lattice& lattice, const Index3& lower, const Index3& upper) const {
   PartMesh whole = mesh_;
-  place_on_lattice(whole, box.lattice);
-  const PartMesh mesh =
-      clipped_to_box(whole, box.lattice, as_point(box.lower) - Vec3::Constant(kClearOfPlanes),
-                     as_point(box.upper) + Vec3::Constant(kClearOfPlanes));
+  place_on_lattice(whole, lattice);
+  const PartMesh mesh = clipped_to_box(whole, lattice, as_point(lower) - Vec3::Constant(kClearOfPlanes),
+                                       as_point(upper) + Vec3::Constant(kClearOfPlanes));
   Voxels voxels = classify_closed(mesh, {.with_moments = true});
   voxels.dropped_fill = kDroppedFillWithMoments;
-  keep_box(voxels, box.lower, box.upper);
-  const Part part = part_in_box(surface_, box.lattice);
+  keep_box(voxels, lower, upper);
+  const Part part = part_in_box(surface_, lattice);
   Body body;
   PolygonCells polygon_cells;
   if (assemble_part(voxels, part, body, polygon_cells).cells == 0)

@@ -11,9 +11,9 @@ class BoxVoxelizer {
   // Keeps a reference. Throws InputError: more than one part, the surface is not closed.
   BoxVoxelizer(const Surface& surface, const HealChoice& how);
 
-  // The part in the voxels of `box`, on its lattice, with exact moments. The body has the whole surface, and surface_cells only of polygons
-  // that pass through the box. Throws InputError: nothing of the part lies in the box.
-  [[nodiscard]] Body operator()(const LatticeBox& box) const;
+  // The part in the voxels of a lattice with lower <= index < upper, with exact moments. The body has the whole surface, and surface_cells
+  // only of polygons that pass through the box. Throws InputError: nothing of the part lies in the box.
+  [[nodiscard]] Body operator()(const Lattice& lattice, const Index3& lower, const Index3& upper) const;
 
  private:
   const Surface& surface_;

@@ -35,12 +35,6 @@ struct Lattice {
   }
 };
 
-// A box of voxels of a lattice.
-struct LatticeBox {
-  Lattice lattice;
-  Index3 lower{}, upper{};  // voxels with lower <= index < upper
-};
-
 struct Part {
   std::string name;      // that of the SurfacePart of the same index
   std::string material;  // name; "" until voxelize --material or a scene gives one

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "base/math/vec.h"
+#include "formats/lattice/body.h"
 
 namespace flexel::simulate {
 
@@ -24,6 +24,12 @@ struct VoxelRange {
   }
 };
 
+// Voxels of a lattice with lower <= index < upper.
+struct LatticeBox {
+  Lattice lattice;
+  Index3 lower{}, upper{};
+};
+
 // The part of a polygon above (side 1) or below (-1) the plane x[axis] = at; fewer than three corners: there is none.
 [[nodiscard]] inline Outline beside_plane(const Outline& outline, int axis, double at, double side) {
   Outline kept;
@@ -36,10 +42,12 @@ struct VoxelRange {
   return kept;
 }
 
+// With what lies on the faces of the range, but for rounding.
 [[nodiscard]] inline Outline in_range(Outline outline, const VoxelRange& range) {
+  constexpr double kOnFace = 1e-6;  // spacings
   for (int axis = 0; axis < 3; ++axis) {
-    outline = beside_plane(outline, axis, range.lower[axis], 1);
-    outline = beside_plane(outline, axis, range.upper[axis], -1);
+    outline = beside_plane(outline, axis, range.lower[axis] - kOnFace, 1);
+    outline = beside_plane(outline, axis, range.upper[axis] + kOnFace, -1);
   }
   return outline;
 }

@@ -9,16 +9,20 @@
 
 namespace flexel::simulate {
 
-// What of the scene it does not have, in words; "" if nothing.
+// What of the scene it does not take, in words; "" if nothing.
 [[nodiscard]] std::string local_stress_lacks(const QuadraticSystem& system);
 
+// m, from supports, bonds and sharp edges, off by up to a cell: beyond it lies what was looked at where the largest stress has no limit.
+[[nodiscard]] double clear_of_singular(const LocalStress& local);
+
 struct LocalStressField {
-  LocalStress found;  // but for `stress`, which is that of the field
-  Stresses field;     // of the body, with what was found where it was looked closer
+  // Of the largest stress; where that lies where it has no limit, of the largest that is clear_of_singular().
+  LocalStress found;
+  Stresses field;  // of the body, with what was found where it was looked closer
 };
 
 // `field`: field_stresses() of the body; `singular`: (elements) for singular_beside(). The run's own displacement stays as it is. Throws
-// InputError, DivergedError, TimeoutError where a look cannot be taken.
+// InputError, DivergedError where a look cannot be taken.
 [[nodiscard]] LocalStressField look_closer(const QuadraticSystem& system, const QuadraticSolution& solution,
                                            const Scene& scene, const CutBox& cut, const Stresses& field,
                                            const std::vector<std::uint8_t>& singular, Progress& progress);

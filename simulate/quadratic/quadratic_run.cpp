@@ -146,33 +146,39 @@ void share_time(const std::vector<ActiveEffect>& effects, double solving, bool e
 }
 
 void refuse_closer_look(const QuadraticSystem& system, const Scene& scene, const SimulateOptions& options) {
-  if (!options.cut_box || !options.must_cut_box) return;
+  if (!options.cut_box) return;
   if (const std::string lacks = local_stress_lacks(system); !lacks.empty())
-    throw InputError(scene.name, "a closer look at the largest stress has no " + lacks);
+    throw InputError(scene.name, "the closer look at the largest stress does not take " + lacks);
 }
 
 // The largest stress on finer cells around it. What the run has stays where they cannot be solved.
 void take_closer_look(const QuadraticSystem& system, const QuadraticSolution& solution, const Scene& scene,
                       const SimulateOptions& options, const Stresses& field, Body& body,
                       SimulateResult& result, Progress& progress) {
-  result.no_local_stress = local_stress_lacks(system);
-  if (!result.no_local_stress.empty()) result.no_local_stress = "it has no " + result.no_local_stress;
-  if (!result.stress->beside.empty()) result.no_local_stress = "it lies beside " + result.stress->beside;
-  if (!result.no_local_stress.empty()) return;
   try {
     progress.stage("largest stress");
     LocalStressField found =
         look_closer(system, solution, scene, options.cut_box, field, singular_elements(system), progress);
+    StressSummary& stress = found.found.stress;
+    if (!result.stress->beside.empty() && !found.found.bar) {
+      result.no_local_stress =
+          fmt::format("it lies beside {}, and farther away none comes to a limit", result.stress->beside);
+      return;
+    }
+    if (found.found.values.empty()) return;
     SimulateResult same;
     report_stress(system.problem(), found.field, body, same);
-    found.found.stress = *same.stress;
-    found.found.stress.beside = found.found.beside;
+    if (same.stress->yield_share && same.stress->value > 0)
+      stress.yield_share = *same.stress->yield_share * stress.value / same.stress->value;
+    result.stress->beside.clear();
+    if (same.stress->value > stress.value) {
+      result.stress = same.stress;
+      mark_singular(body, singular_elements(system), result, kBesideInField);
+    }
     result.local_stress = std::move(found.found);
   } catch (const InputError& error) {
     result.no_local_stress = error.what();
   } catch (const DivergedError& error) {
-    result.no_local_stress = error.what();
-  } catch (const TimeoutError& error) {
     result.no_local_stress = error.what();
   }
 }

@@ -12,6 +12,7 @@
 #include <memory>
 
 #include "formats/lattice/body.h"
+#include "simulate/matter/voxel_pieces.h"
 #include "simulate/quadratic/quadratic_solve.h"
 
 namespace flexel::simulate {

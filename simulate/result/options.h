@@ -7,11 +7,11 @@
 
 namespace flexel {
 struct Body;  // formats/lattice/body.h
-struct LatticeBox;
-}  // namespace flexel
+}
 
 namespace flexel::simulate {
 
+struct LatticeBox;  // simulate/matter/voxel_pieces.h
 struct Checkpoint;  // simulate/time/checkpoint.h
 
 // The matter of the run's part in a box of a lattice, with the part's whole surface and exact moments (voxelize/voxelize_box.h). Throws
@@ -43,10 +43,8 @@ struct SimulateOptions {
   // Timed runs: called with each frame's body and time [s], on the thread of the run; the body is the run's own, and
   // another after the call.
   std::function<void(const Body& body, double time)> on_frame = {};
-  // Model `quadratic`: what the largest stress is looked at closer with (docs/theory/local-stress.md); null: it is not. `must_cut_box`:
-  // what cannot be is refused, else left out.
+  // Model `quadratic`: what the largest stress is looked at closer with (docs/theory/local-stress.md); null: it is not.
   CutBox cut_box = {};
-  bool must_cut_box = false;
 };
 
 }  // namespace flexel::simulate

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "formats/lattice/quadratic_field.h"
+#include "simulate/matter/voxel_pieces.h"
 #include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
 #include "tests/voxelize/shapes.h"
@@ -26,15 +27,15 @@ constexpr const char* kQuarter =
     "\"zmin\"\naxes = \"z\"\n";
 constexpr const char* kDrawn = "[[load]]\nwhere = \"xmax\"\npressure = \"-10 MPa\"\n";
 
-// As of the runs themselves (Quadratic.PatchTest): with what keeps cells of slivers regular.
-constexpr double kBesideSlivers = 1e-3;
+// Measured: 1.2e-4 on the finer cells, 2.9e-4 of a run itself (1e-3 in Quadratic.PatchTest), of what keeps cells of slivers regular.
+constexpr double kBesideSlivers = 5e-4;
 
 struct Ran {
   Body body;
   simulate::SimulateResult result;
 };
 
-Ran ran(const Mesh& mesh, double size, const std::string& scene, bool closer, bool must = false) {
+Ran ran(const Mesh& mesh, double size, const std::string& scene, bool closer) {
   Progress progress("test", Progress::Mode::quiet);
   voxelize::VoxelizeOptions how;
   how.size = size;
@@ -45,8 +46,10 @@ Ran ran(const Mesh& mesh, double size, const std::string& scene, bool closer, bo
   made.body = voxelize::voxelize(voxelize::shapes::surface(mesh), how, progress).body;
   simulate::SimulateOptions options;
   const voxelize::BoxVoxelizer boxes(made.body.surface, {});
-  if (closer) options.cut_box = std::cref(boxes);
-  options.must_cut_box = must;
+  if (closer)
+    options.cut_box = [&boxes](const simulate::LatticeBox& box) {
+      return boxes(box.lattice, box.lower, box.upper);
+    };
   made.result =
       simulate::simulate(made.body, simulate::parse_scene(kSteel + scene, "s.toml"), options, progress);
   return made;
@@ -75,6 +78,32 @@ Mesh plate_with_hole(double radius, double side, double thickness, std::uint32_t
   return voxelize::shapes::prism(outline, caps, 0, thickness);
 }
 
+// Half of a bar along x, 0.16 x 0.03 m, whose upper side has round notches: x of the middle, radius and depth of each; m.
+Mesh notched_bar(const std::vector<Vec3>& notches, double thickness) {
+  constexpr double kLength = 0.16, kHeight = 0.03;
+  constexpr std::uint32_t kSteps = 96;  // of a notch
+  std::vector<std::array<double, 2>> upper = {{0, kHeight}};
+  for (const Vec3& notch : notches) {
+    const double radius = notch[1], most = std::acos(1 - notch[2] / radius);
+    for (std::uint32_t k = 0; k <= kSteps; ++k) {
+      const double angle = most * (2.0 * k / kSteps - 1);
+      upper.push_back(
+          {notch[0] + radius * std::sin(angle), kHeight + radius - notch[2] - radius * std::cos(angle)});
+    }
+  }
+  upper.push_back({kLength, kHeight});
+  std::vector<std::array<double, 2>> outline;
+  for (const auto& each : upper) outline.push_back({each[0], 0});
+  outline.insert(outline.end(), upper.rbegin(), upper.rend());
+  std::vector<std::array<std::uint32_t, 3>> caps;
+  const auto last = static_cast<std::uint32_t>(outline.size()) - 1;
+  for (std::uint32_t k = 0; k + 1 < upper.size(); ++k) {
+    caps.push_back({k, k + 1, last - k - 1});
+    caps.push_back({k, last - k - 1, last - k});
+  }
+  return voxelize::shapes::prism(outline, caps, 0, thickness);
+}
+
 // The largest of what travels with the body is the summary's.
 void expect_one_figure(const Ran& run) {
   const std::vector<double>& elements = run.body.element_columns.at("von_mises").values;
@@ -92,6 +121,17 @@ TEST(LocalStress, AnEvenStressStaysAsItIs) {
   for (const double value : run.result.local_stress->values) EXPECT_NEAR(value / 10e6, 1, kBesideSlivers);
   EXPECT_NEAR(run.result.stress->value / 10e6, 1, kBesideSlivers);
   expect_one_figure(run);
+}
+
+// Supports that lie on the face of a box (three whole cells) are not lost: an even plane strain stays one.
+TEST(LocalStress, SupportsOnAFaceOfTheBoxHold) {
+  const Mesh bar = voxelize::shapes::box(Vec3(0, 0, 0), Vec3(0.1, 0.0367, 0.0213));
+  const Ran run =
+      ran(bar, 0.0071, std::string(kQuarter) + kDrawn + "[[fix]]\nwhere = \"zmax\"\naxes = \"z\"\n", true);
+  EXPECT_EQ(run.result.no_local_stress, "");
+  ASSERT_TRUE(run.result.local_stress);
+  const double even = 10e6 * std::sqrt(1 - 0.3 + 0.09);
+  for (const double value : run.result.local_stress->values) EXPECT_NEAR(value / even, 1, kBesideSlivers);
 }
 
 // A hole whose radius is 1.2 cells: its peak is a fifth off; looked at closer it is what a lattice four times as fine says.
@@ -149,17 +189,29 @@ TEST(LocalStress, HasNoBarAtAReEntrantEdge) {
   EXPECT_THAT(run.result.stress->beside, HasSubstr("re-entrant edge"));
   ASSERT_TRUE(run.result.error_bars.von_mises);
   EXPECT_FALSE(run.result.error_bars.von_mises->bar);
-  EXPECT_THAT(run.result.no_local_stress, HasSubstr("re-entrant edge"));
+  if (run.result.no_local_stress.empty()) {
+    EXPECT_LT(run.result.local_stress->stress.value, run.result.stress->value);
+    EXPECT_GT((run.result.local_stress->stress.at - run.result.stress->at).norm(), 0.0043);
+  }
 }
 
-TEST(LocalStress, HasNoBarAtAClamp) {
-  const Mesh bar = voxelize::shapes::box(Vec3(0, 0, 0), Vec3(0.1, 0.02, 0.02));
+// The clamp has no limit; away from it a bar has what beam theory says.
+TEST(LocalStress, AwayFromAClampIsWhatBeamTheorySays) {
+  const Mesh bar = voxelize::shapes::box(Vec3(0, 0, 0), Vec3(0.2, 0.02, 0.02));
   const Ran run =
-      ran(bar, 0.0067, "[[fix]]\nwhere = \"xmin\"\n[[load]]\nwhere = \"xmax\"\nforce = [0, 0, \"-100 N\"]\n",
+      ran(bar, 0.01, "[[fix]]\nwhere = \"xmin\"\n[[load]]\nwhere = \"xmax\"\nforce = [0, 0, \"-1000 N\"]\n",
           true);
   EXPECT_EQ(run.result.stress->beside, "a support");
   EXPECT_FALSE(run.result.error_bars.von_mises->bar);
-  EXPECT_FALSE(run.result.local_stress);
+  ASSERT_TRUE(run.result.local_stress);
+  const simulate::LocalStress& away = *run.result.local_stress;
+  ASSERT_TRUE(away.bar);
+  EXPECT_GT(away.stress.at.x(), 0.0199);
+  EXPECT_LT(away.stress.at.x(), 0.0251);
+  const double theory = 1000 * (0.2 - away.stress.at.x()) * 0.01 / (std::pow(0.02, 4) / 12);
+  EXPECT_NEAR(away.stress.value / theory, 1, 0.01);
+  const std::vector<double>& elements = run.body.element_columns.at("von_mises").values;
+  EXPECT_DOUBLE_EQ(*std::max_element(elements.begin(), elements.end()), run.result.stress->value);
 }
 
 // Part of a force that is spread over a face, and part of a support, lie in the box.
@@ -172,11 +224,27 @@ TEST(LocalStress, LoadsAndSupportsAreSharesOfTheWhole) {
   for (const double value : run.result.local_stress->values) EXPECT_NEAR(value / 10e6, 1, kBesideSlivers);
 }
 
+// A notch of a sixth of a cell, which the run hardly sees, has a larger stress (Kt = 3.065 of the semicircular one) than the wide one
+// that it finds.
+TEST(LocalStress, FindsANotchThatTheRunDoesNotSee) {
+  const Mesh bar = notched_bar({Vec3(0.05, 0.016, 0.004), Vec3(0.12, 0.0008, 0.0008)}, 0.004);
+  // in plane strain the von Mises stress of a free surface is sqrt(1 - nu + nu^2) of the one along it
+  const std::string scene = std::string(kQuarter) + kDrawn + "[[fix]]\nwhere = \"zmax\"\naxes = \"z\"\n";
+  const double truth = 3.065 * 10e6 * std::sqrt(1 - 0.3 + 0.09);
+  const Ran rough = ran(bar, 0.0051, scene, false), local = ran(bar, 0.0051, scene, true);
+  EXPECT_LT(std::abs(rough.result.stress->at.x() - 0.05), 0.01);
+  EXPECT_LT(std::abs(local.result.stress->at.x() - 0.12), 0.001);
+  EXPECT_NEAR(local.result.stress->value / truth, 1, 0.03);
+  ASSERT_TRUE(local.result.local_stress->bar);
+  EXPECT_NEAR(local.result.stress->value, truth, local.result.local_stress->bar->half_width);
+  expect_one_figure(local);
+}
+
 TEST(LocalStress, RefusesByName) {
   const Mesh bar = voxelize::shapes::box(Vec3(0, 0, 0), Vec3(0.1, 0.02, 0.02));
   const auto refused = [&](const std::string& scene) {
     try {
-      (void)ran(bar, 0.01, scene, true, true);
+      (void)ran(bar, 0.01, scene, true);
     } catch (const InputError& error) {
       return std::string(error.what());
     }
@@ -184,9 +252,9 @@ TEST(LocalStress, RefusesByName) {
   };
   const std::string held = "[[fix]]\nwhere = \"xmin\"\n";
   EXPECT_THAT(refused(held + "[[load]]\nwhere = \"xmax\"\nforce = [0, 0, \"-1 N\"]\nlink = \"rigid\"\n"),
-              HasSubstr("a closer look at the largest stress has no rigid links"));
+              HasSubstr("closer look at the largest stress does not take rigid links"));
   EXPECT_THAT(refused(held + "[[load]]\nwhere = \"xmax\"\nforce = [0, 0, \"-1 N\"]\nfollower = true\n"),
-              HasSubstr("has no loads that follow"));
+              HasSubstr("does not take loads that follow"));
 }
 
 }  // namespace

@@ -142,17 +142,32 @@ def test_a_closer_look_beside_a_clamp_finds_no_limit():
     summary, _ = look_closer(part, "4 mm", MATERIAL + '[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = [0, 0, "-10 N"]\n')
     expect(summary["largest_von_mises_beside"] == "a support", summary)
     expect(summary["error_bars"]["largest_von_mises"]["bar"] is None, summary["error_bars"])
-    expect(summary["largest_von_mises_local_none"] == "it lies beside a support", summary)
+    expect(summary["largest_von_mises_local_none"] == "it lies beside a support, and farther away none comes to a limit", summary)
+
+
+def test_a_closer_look_at_the_edge_of_a_punch_finds_no_limit():
+    """A block pressed down on a half of its upper side, which cannot rise: at the end of that half the pressure has no limit."""
+    part = quarter("block.obj", lambda s: (40 - 40 * s, 0), lambda s: (40 - 40 * s, 20), 20, 8)
+    lines = pathlib.Path(part).read_text().splitlines()
+    after = lines.index("g outer") + 4
+    pathlib.Path(part).write_text("\n".join(lines[:after + 1] + ["g free"] + lines[after + 1:]) + "\n")
+    scene = MATERIAL + PLANE + '[[fix]]\nwhere = "start"\naxes = "x"\n[[fix]]\nwhere = "outer"\naxes = "y"\n[[load]]\nwhere = "inner"\npressure = "10 MPa"\n'
+    summary, done = look_closer(part, "5.3 mm", scene)
+    expect("largest_von_mises_local" in summary, summary)
+    expect(summary["error_bars"]["largest_von_mises"]["bar"] is None, summary)
+    expect("does not converge" in done.out.decode() + done.err, done)
 
 
 def test_a_closer_look_is_refused_by_name():
     part = write("bar.stl", ascii_stl(box_triangles((60, 10, 10))))
     common = ("flexel", "deform", part, "--fix", "xmin", "--material", "steel", "--size", "4 mm", "--refine-stress", "-o", "bent.stl")
     expect_error(run(*common, "--push", "xmax: 0 0 -10 N", "--model", "cells"), "flexel", '--refine-stress is for model "quadratic": add --model quadratic')
+    expect_error(run(*common[:7], *common[9:], "--push", "xmax: 0 0 -10 N", "--model", "quadratic", "--within", "9s"), "flexel",
+                 "--refine-stress takes time of its own: leave --within out")
     linked = MATERIAL + '[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = [0, 0, "-10 N"]\nlink = "rigid"\n'
     write("linked.toml", linked)
     expect_error(run("flexel", "deform", part, "--scene", "linked.toml", "--size", "4 mm", "--refine-stress", "-o", "bent.stl"), "flexel",
-                 "a closer look at the largest stress has no rigid links and rigid parts")
+                 "the closer look at the largest stress does not take rigid links and rigid parts")
 
 
 def test_nafems_le1():
