@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <memory>
 #include <new>
 #include <nlohmann/json.hpp>
 
@@ -35,6 +36,7 @@
 #include "mapping/report/report.h"
 #include "simulate/answer.h"
 #include "simulate/input/infill.h"
+#include "simulate/matter/voxel_pieces.h"
 #include "simulate/quadratic/quadratic_run.h"
 #include "simulate/result/options.h"
 #include "simulate/result/overload.h"
@@ -45,6 +47,7 @@
 #include "voxelize/memory.h"
 #include "voxelize/report.h"
 #include "voxelize/voxelize.h"
+#include "voxelize/voxelize_box.h"
 
 namespace flexel::commands {
 namespace {
@@ -64,6 +67,7 @@ struct DeformArguments {
   mapping::MapArguments map;
   int threads = 0;
   bool quiet = false, verbose = false, estimate = true, json = false;
+  bool closer = false;  // a closer look at the largest stress
   bool needs_output = true;
   const Surface* part = nullptr;  // in place of the files
 };
@@ -100,6 +104,8 @@ void declare_output(CommandLine& app, DeformArguments& arguments) {
                  "Choose the finest size whose run ends within this time, all in all (\"10s\")")
       .type_name("TIME");
   app.add_flag("!--no-estimate", arguments.estimate, "Leave out the error bars (docs/theory/error-bars.md)");
+  app.add_flag("--refine-stress", arguments.closer,
+               "Look at the largest stress again, on finer cells around it (docs/theory/local-stress.md)");
   app.add_flag("--quiet", arguments.quiet, "Say only warnings and errors");
   app.add_flag("--verbose", arguments.verbose, "Say all that each stage found");
 }
@@ -215,6 +221,13 @@ void plan_refinement(Plan& plan) {
   plan.refine.mode = mapping::RefineOptions::Mode::off;
 }
 
+void refuse_closer_look(const DeformArguments& arguments, const Plan& plan) {
+  if (arguments.closer && !simulate::asks_for_quadratic(plan.job.scene))
+    throw InputError("--refine-stress is for model \"quadratic\": add --model quadratic");
+  if (arguments.closer && !arguments.within.empty())
+    throw InputError("--refine-stress takes time of its own: leave --within out");
+}
+
 Plan make_plan(const DeformArguments& arguments, const CommandLine& app) {
   Plan plan;
   plan.map = map_options(arguments.map);
@@ -224,6 +237,7 @@ Plan make_plan(const DeformArguments& arguments, const CommandLine& app) {
   plan_refinement(plan);
   plan.job = plan_job(arguments.job);
   plan_goal(arguments, app, plan);
+  refuse_closer_look(arguments, plan);
   return plan;
 }
 
@@ -251,6 +265,16 @@ std::vector<mapping::CadAnswer> write_outputs(const DeformArguments& arguments, 
     else
       write_body(body, output.path);
   return answers;
+}
+
+// What the largest stress is looked at closer with, where that is asked for. `body`: that the run is given.
+simulate::CutBox cut_box(const DeformArguments& arguments, const Plan& plan, const Body& body) {
+  if (!arguments.closer) return {};
+  const auto voxelizer = std::make_shared<std::optional<voxelize::BoxVoxelizer>>();
+  return [voxelizer, &body, heal = plan.job.voxelize.heal](const simulate::LatticeBox& box) {
+    if (!*voxelizer) voxelizer->emplace(body.surface, heal);
+    return (**voxelizer)(box.lattice, box.lower, box.upper);
+  };
 }
 
 simulate::SimulateOptions simulate_options(const DeformArguments& arguments, const Plan& plan) {
@@ -568,6 +592,28 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
   return run;
 }
 
+// The run that was chosen again, with a closer look at its largest stress. Its bars stay, which other sizes may have widened.
+SolvedRun with_closer_look(const DeformArguments& arguments, const Plan& plan, const Surface& surface,
+                           SolvedRun chosen, Progress& progress) {
+  HeldWarnings told;  // by the run that was chosen
+  progress.stage("largest stress");
+  Progress inner("flexel", Progress::Mode::quiet);
+  voxelize::VoxelizeOptions how = plan.job.voxelize;
+  how.size = chosen.size;
+  const simulate::ErrorBars bars = std::move(chosen.simulated.error_bars);
+  chosen.voxels = voxelize::voxelize(surface, how, inner);
+  Job job = plan.job;
+  add_actions(job, chosen.voxels.body);
+  simulate::SimulateOptions asked = simulate_options(arguments, plan);
+  asked.cut_box = cut_box(arguments, plan, chosen.voxels.body);
+  chosen.simulated = simulate::simulate(chosen.voxels.body, job.scene, asked, inner);
+  std::optional<simulate::StressBar> stress = chosen.simulated.error_bars.von_mises;
+  chosen.simulated.error_bars = bars;
+  chosen.simulated.error_bars.von_mises = std::move(stress);
+  (void)told.take();
+  return chosen;
+}
+
 Surface read_part_files(const DeformArguments& arguments, const Plan& plan, Progress& progress) {
   if (arguments.part != nullptr) return *arguments.part;
   const StopEndsProcess at_once;
@@ -580,9 +626,13 @@ SolvedRun solve(const DeformArguments& arguments, Plan& plan, std::optional<Accu
   progress.stage("import");
   Surface surface = read_part_files(arguments, plan, progress);
   check_parts(plan.job, surface);
+  if (arguments.closer && surface.parts.size() > 1)
+    throw InputError(fmt::format("--refine-stress is for one part, and there are {}", surface.parts.size()));
   if (plan.goal) {
     progress.stage("choose the size");
-    return solve_to_goal(arguments, plan, surface, accuracy.emplace(), progress);
+    SolvedRun run = solve_to_goal(arguments, plan, surface, accuracy.emplace(), progress);
+    return arguments.closer ? with_closer_look(arguments, plan, surface, std::move(run), progress)
+                            : std::move(run);
   }
   SolvedRun run;
   {
@@ -591,8 +641,9 @@ SolvedRun solve(const DeformArguments& arguments, Plan& plan, std::optional<Accu
   }
   voxelize::report(run.voxels, progress);
   add_actions(plan.job, run.voxels.body);
-  run.simulated =
-      simulate::simulate(run.voxels.body, plan.job.scene, simulate_options(arguments, plan), progress);
+  simulate::SimulateOptions asked = simulate_options(arguments, plan);
+  asked.cut_box = cut_box(arguments, plan, run.voxels.body);
+  run.simulated = simulate::simulate(run.voxels.body, plan.job.scene, asked, progress);
   use_field(run.voxels.body, arguments.map, plan.map);
   return run;
 }

@@ -10,6 +10,7 @@
 #include "base/units.h"
 #include "simulate/estimate/error_bars.h"
 #include "simulate/mode_lines.h"
+#include "simulate/quadratic/local_stress.h"
 #include "simulate/scene/strength.h"
 
 namespace flexel::simulate {
@@ -186,8 +187,17 @@ bool stress_settles(const SimulateResult& result) {
 std::string unsure(const SimulateResult& result) {
   if (stress_settles(result)) return "";
   const std::string& beside = result.stress->beside;
-  return beside.empty() ? "; smaller cells may show more"
-                        : fmt::format("; smaller cells show more beside {}", beside);
+  if (beside.empty()) return "; smaller cells may show more";
+  std::string text = fmt::format("; smaller cells show more beside {}", beside);
+  if (result.local_stress && result.local_stress->stress.beside.empty()) {
+    const LocalStress& local = *result.local_stress;
+    text += fmt::format(", and some {} and more away from such places the largest is {} at {}",
+                        human_length(clear_of_singular(local)),
+                        local.bar ? pressure_with_bar(local.stress.value, local.bar->half_width)
+                                  : "about " + human_pressure(local.stress.value),
+                        place_in_one_unit(local.stress.at));
+  }
+  return text;
 }
 
 std::string peak_stress(const SimulateResult& result, double stress) {

@@ -344,6 +344,19 @@ ErrorBars bars_at_rest(Body& body, const Scene& scene, const SimulateOptions& op
   return estimate_errors(body, scene, options, result, solve, progress);
 }
 
+// What the closer look found is the largest stress, with its own bar.
+void prefer_local_stress(bool estimate, SimulateResult& result) {
+  if (!result.local_stress) return;
+  const LocalStress& local = *result.local_stress;
+  if (!result.stress->beside.empty()) return;  // it is of a peak elsewhere
+  result.stress = local.stress;
+  if (!estimate) return;
+  const std::size_t last = local.values.size() - 1;
+  result.error_bars.von_mises = {{local.values[0], local.values[std::min<std::size_t>(1, last)],
+                                  local.values[std::min<std::size_t>(2, last)]},
+                                 local.bar};
+}
+
 // run_at_rest() with its error bars.
 SimulateResult run_and_judge(Body& body, const Scene& scene, const SimulateOptions& options,
                              Progress& progress) {
@@ -353,6 +366,7 @@ SimulateResult run_and_judge(Body& body, const Scene& scene, const SimulateOptio
     progress.stage("error bars");
     result.error_bars = bars_at_rest(body, scene, options, result, progress);
   }
+  prefer_local_stress(options.estimate, result);
   if (const std::string told = near_buckling(linear_reach, result); !told.empty())
     progress.warn(scene.name + ": " + told);
   return result;

@@ -1,11 +1,12 @@
 #!/usr/bin/python3
 """The largest stress of model `quadratic` and its bar, beside known answers: writes docs/measurements/stresses.md.
 
-    PATH=build/release/bin:$PATH bench/accuracy/stresses.py [--only CASE] [--random COUNT] [--jobs N] [-o FILE]
+    PATH=build/release/bin:$PATH bench/accuracy/stresses.py [--only CASE] [--random COUNT] [--closer] [--jobs N] [-o FILE]
 
 Parts are blocks bent to shape (OBJ), on lattices that do not follow them. References: Lame's solutions of thick tubes and spheres;
 NAFEMS LE1 and LE10 (sigma_yy at point D, 92.7 and -5.38 MPa); plates with a hole and with fillets, CalculiX's CPE8 run here (ccx),
 refined until two meshes differ by less than .2 %. Seconds: the whole process of flexel-simulate with its bars, one thread.
+--closer makes the section "Looked at closer" alone, and puts it in place of the page's.
 """
 
 import argparse
@@ -307,11 +308,8 @@ def at_point(folder, where, which):
 
 def run_case(folder, name, case, sizes):
     """Rows: size mm, cells, value, bar (or None) and what it lies beside, seconds; a run that failed has its message in place of them."""
-    counts, points, group, loads, _, given = case
-    write_block(folder / "part.obj", counts, points, *([group] if group else []))
-    (folder / "scene.toml").write_text(f'material = "steel"\nmodel = "quadratic"\n[materials.steel]\nyoung = "{YOUNG} Pa"\npoisson = {POISSON}\n'
-                                       f'density = "7800 kg/m3"\nyield = "250 MPa"\n{loads}')
-    rows = []
+    write_case(folder, case)
+    given, rows = case[5], []
     for size in sizes:
         call("flexel-voxelize", folder / "part.obj", "--size", f"{size} mm", "--align", "none", "--moments", "--threads", "1", "--quiet", "--force", "-o", folder / "body.vtu")
         try:
@@ -328,6 +326,56 @@ def run_case(folder, name, case, sizes):
         rows.append((size, found["cells"], value, bar, found.get("largest_von_mises_beside", ""), seconds))
         print(name, *rows[-1], said and said["values"], file=sys.stderr, flush=True)
     return rows
+
+
+CLOSER = "## Looked at closer"
+CLOSER_SIZES = {"tube": (20, 13, 10), "sphere": (13, 10), "hole": (5, 3.4, 2.5), "fillet": (6, 4, 3), "hole 7, 7 in 45": (5.3, 3.3), "hole 9, 6 in 42": (4.9,),
+                "hole 10, 12 in 40": (6.7, 4.4), "fillet 8, 14 to 26": (5.3, 3.4), "fillet 14, 16 to 36": (7.7, 5.1)}
+
+
+def write_case(folder, case):
+    counts, points, group, loads, _, _ = case
+    write_block(folder / "part.obj", counts, points, *([group] if group else []))
+    (folder / "scene.toml").write_text(f'material = "steel"\nmodel = "quadratic"\n[materials.steel]\nyoung = "{YOUNG} Pa"\npoisson = {POISSON}\n'
+                                       f'density = "7800 kg/m3"\nyield = "250 MPa"\n{loads}')
+
+
+def run_closer(folder, name, case, size):
+    """Size mm, then of a run and of one that looks closer: cells, value Pa, bar Pa or None, seconds, cells of all finer lattices."""
+    write_case(folder, case)
+    row = [size]
+    for more in ((), ("--refine-stress",)):
+        seconds = call("flexel", "deform", folder / "part.obj", "--scene", folder / "scene.toml", "--size", f"{size} mm", "--threads", "1", "--quiet", "--force", *more,
+                       "--summary", folder / "s.json", "-o", folder / "out.stl")
+        found = json.loads((folder / "s.json").read_text())["simulate"]
+        said = found.get("error_bars", {}).get("largest_von_mises")
+        row.append((found["cells"], found["largest_von_mises"], said["bar"] if said else None, seconds, found.get("largest_von_mises_local", {}).get("cells", 0)))
+    print(name, *row, found.get("largest_von_mises_local", found.get("largest_von_mises_local_none")), file=sys.stderr, flush=True)
+    return row
+
+
+def closer_section(results):
+    text = (f"{CLOSER}\n\n`flexel deform --refine-stress` ([local-stress.md](../theory/local-stress.md)) beside `flexel deform` without it, on coarse lattices aligned to the\n"
+            "part. Seconds: the whole process, bars included; cells more: of all finer lattices together.\n\n"
+            "| case | reference MPa | size mm | cells | error % | bar % | s | closer: error % | bar % | holds | cells more | s |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n")
+    widths, held, worst = [], 0, 0
+    for name, (true, rows) in results.items():
+        for size, (cells, value, bar, seconds, _), (_, closer, narrow, longer, more) in rows:
+            share = lambda width, of: f"{100 * width / of:.1f}" if width else "none"
+            holds = narrow and abs(closer - true) <= narrow
+            widths += [100 * narrow / closer] if narrow else []
+            held, worst = held + bool(holds), max(worst, abs(closer / true - 1))
+            text += (f"| {name} | {true / 1e6:.4g} | {size} | {cells:,} | {100 * (value / true - 1):+.1f} | {share(bar, value)} | {seconds:.1f} | "
+                     f"{100 * (closer / true - 1):+.1f} | {share(narrow, closer)} | {'yes' if holds else 'no' if narrow else ''} | {more:,} | {longer:.1f} |\n")
+    return text + f"\n{held} of {len(widths)} bars hold; their median is {statistics.median(widths):.1f} %, the largest error {100 * worst:.1f} %.\n"
+
+
+def measure_closer(options, in_a_folder):
+    chosen = {name: case for name, case in {**cases(), **unseen_cases()}.items() if name in CLOSER_SIZES and (not options.only or name in options.only)}
+    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        runs = {(name, size): pool.submit(in_a_folder, run_closer, name, case, size) for name, case in chosen.items() for size in CLOSER_SIZES[name]}
+        true = {name: pool.submit(in_a_folder, reference, name, case[5]) for name, case in chosen.items()}
+        return closer_section({name: (true[name].result(), [runs[name, size].result() for size in CLOSER_SIZES[name]]) for name in chosen})
 
 
 def table(results):
@@ -364,18 +412,30 @@ def one_table(results):
     return text + (f"\n{held} of {barred} bars hold; their median is {statistics.median(widths):.1f} %.\n" if widths else "")
 
 
+def write(path, text):
+    part = path.with_name(path.name + ".part")
+    part.write_text(text, encoding="utf-8")
+    part.replace(path)
+
+
 def main():
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("-o", "--output", default=ROOT / "docs/measurements/stresses.md", type=pathlib.Path)
     arguments.add_argument("--only", action="append")
     arguments.add_argument("--random", type=int, default=0, metavar="COUNT", help="add so many cases, of measures and sizes by chance")
     arguments.add_argument("--jobs", type=int, default=1, help="cases at a time")
+    arguments.add_argument("--closer", action="store_true", help="the section of the closer look alone")
     options = arguments.parse_args()
 
     def in_a_folder(function, *words):
         with tempfile.TemporaryDirectory() as place:
             return function(pathlib.Path(place), *words)
 
+    closer = measure_closer(options, in_a_folder)
+    if options.closer:
+        page = options.output.read_text(encoding="utf-8") if options.output.exists() else ""
+        write(options.output, page.split(CLOSER)[0].rstrip("\n") + "\n\n" + closer)
+        return 0
     chosen = {name: case for name, case in {**cases(), **unseen_cases(), **random_cases(options.random)}.items()
               if not options.only or name in options.only}
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
@@ -384,9 +444,7 @@ def main():
                 for back in range(1, 8) for name, case in chosen.items() for size in case[4][-back:][:1] if back <= len(case[4])}
         true = {name: pool.submit(in_a_folder, reference, name, case[5]) for name, case in chosen.items()}
         results = {name: (true[name].result(), [row for size in case[4] for row in runs[name, size].result()]) for name, case in chosen.items()}
-    part = options.output.with_name(options.output.name + ".part")
-    part.write_text(table(results), encoding="utf-8")
-    part.replace(options.output)
+    write(options.output, table(results) + "\n" + closer)
     return 0
 
 

@@ -87,6 +87,7 @@ class CoarseRuns {
     found_.back().moved.push_back(most.displacement);
     options_.explain = options_.estimate = false;
     options_.failed_output.clear();
+    options_.cut_box = {};
   }
 
   // Adds one lattice; false, with the reason, where it cannot be done. A lattice whose cells are wider than

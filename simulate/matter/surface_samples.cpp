@@ -10,7 +10,6 @@
 
 #include "base/math/area_vector.h"
 #include "formats/lattice/locate.h"
-#include "simulate/matter/voxel_pieces.h"
 
 namespace flexel::simulate {
 namespace {
@@ -29,8 +28,8 @@ struct Smooth {
 
 class Sampler {
  public:
-  Sampler(const Body& body, const std::vector<double>& pressure)
-      : body_(body), surface_(body.surface), pressure_(pressure) {}
+  Sampler(const Body& body, const std::vector<double>& pressure, const VoxelRange* range)
+      : body_(body), surface_(body.surface), pressure_(pressure), range_(range) {}
 
   std::vector<SurfaceSample> operator()() {
     find_corners();
@@ -80,12 +79,18 @@ class Sampler {
       std::optional<CellPoint> under;
       for (auto c = left.begin(); c != beyond; ++c) {
         smooth_[*c] = smooth;
-        if (!under) under = locate_on_surface(body_, polygon_[*c], surface_.vertices[vertex]);
+        if (!under && in_reach(polygon_[*c], surface_.vertices[vertex]))
+          under = locate_on_surface(body_, polygon_[*c], surface_.vertices[vertex]);
       }
       if (under)
         samples_.push_back({under->cell, vertex, true, surface_.vertices[vertex], smooth.normal, pressure});
       left.erase(left.begin(), beyond);
     }
+  }
+
+  [[nodiscard]] bool in_reach(std::uint32_t polygon, const Vec3& at) const {
+    return range_ == nullptr ||
+           range_->contains(body_.parts[surface_.polygon_part(polygon)].lattice.to_lattice(at));
   }
 
   void sample_triangle(std::uint32_t polygon, const std::array<std::uint32_t, 3>& corners) {
@@ -96,6 +101,8 @@ class Sampler {
     for (std::size_t i = 0; i < 3; ++i)
       longest = std::max(longest, (outline[(i + 1) % 3] - outline[i]).cwiseAbs().maxCoeff());
     if (longest <= kLong || !(area_[polygon].norm() > 0)) return;
+    if (range_ != nullptr) outline = in_range(outline, *range_);
+    if (outline.size() < 3) return;
     SurfaceLocator locate(body_, polygon);
     for_each_voxel(outline, 0, [&](const Outline& piece) {
       const Vec3 middle = middle_of(piece);
@@ -153,6 +160,7 @@ class Sampler {
   const Body& body_;
   const Surface& surface_;
   const std::vector<double>& pressure_;
+  const VoxelRange* range_;
   std::vector<std::uint32_t> offsets_, corners_;  // of each vertex, corners of polygons
   std::vector<std::uint32_t> polygon_;            // (corners)
   std::vector<Vec3> area_;                        // (polygons) m^2
@@ -163,8 +171,9 @@ class Sampler {
 
 }  // namespace
 
-std::vector<SurfaceSample> surface_samples(const Body& body, const std::vector<double>& pressure) {
-  return Sampler(body, pressure)();
+std::vector<SurfaceSample> surface_samples(const Body& body, const std::vector<double>& pressure,
+                                           const VoxelRange* range) {
+  return Sampler(body, pressure, range)();
 }
 
 }  // namespace flexel::simulate

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "formats/lattice/body.h"
+#include "simulate/matter/voxel_pieces.h"
 
 namespace flexel::simulate {
 
@@ -23,8 +24,9 @@ struct SurfaceSample {
 };
 
 // `pressure`: (polygons) [Pa], 0 where nothing acts. No sample where no cell lies under the surface, nor on polygons without
-// area. In order of the vertices, then of the triangles.
+// area, nor outside of `range` (null: everywhere). In order of the vertices, then of the triangles.
 [[nodiscard]] std::vector<SurfaceSample> surface_samples(const Body& body,
-                                                         const std::vector<double>& pressure);
+                                                         const std::vector<double>& pressure,
+                                                         const VoxelRange* range = nullptr);
 
 }  // namespace flexel::simulate

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "base/math/vec.h"
+#include "formats/lattice/body.h"
 
 namespace flexel::simulate {
 
@@ -14,6 +14,42 @@ using Outline = std::vector<Vec3>;  // of a convex polygon, lattice coordinates
   Vec3 sum = Vec3::Zero();
   for (const Vec3& corner : outline) sum += corner;
   return sum / static_cast<double>(outline.size());
+}
+
+// Voxels, from lower to upper in lattice coordinates.
+struct VoxelRange {
+  Vec3 lower = Vec3::Zero(), upper = Vec3::Zero();
+  [[nodiscard]] bool contains(const Vec3& at) const {
+    return (at.array() >= lower.array()).all() && (at.array() <= upper.array()).all();
+  }
+};
+
+// Voxels of a lattice with lower <= index < upper.
+struct LatticeBox {
+  Lattice lattice;
+  Index3 lower{}, upper{};
+};
+
+// The part of a polygon above (side 1) or below (-1) the plane x[axis] = at; fewer than three corners: there is none.
+[[nodiscard]] inline Outline beside_plane(const Outline& outline, int axis, double at, double side) {
+  Outline kept;
+  for (std::size_t v = 0; v < outline.size(); ++v) {
+    const Vec3 &a = outline[v], &b = outline[(v + 1) % outline.size()];
+    const double da = side * (a[axis] - at), db = side * (b[axis] - at);
+    if (da >= 0) kept.push_back(a);
+    if ((da > 0 && db < 0) || (da < 0 && db > 0)) kept.push_back(a + (b - a) * (da / (da - db)));
+  }
+  return kept;
+}
+
+// With what lies on the faces of the range, but for rounding.
+[[nodiscard]] inline Outline in_range(Outline outline, const VoxelRange& range) {
+  constexpr double kOnFace = 1e-6;  // spacings
+  for (int axis = 0; axis < 3; ++axis) {
+    outline = beside_plane(outline, axis, range.lower[axis] - kOnFace, 1);
+    outline = beside_plane(outline, axis, range.upper[axis] + kOnFace, -1);
+  }
+  return outline;
 }
 
 // Calls visit(piece) for the part of a polygon in each voxel; from axis 0 on, axis by axis.
@@ -27,18 +63,7 @@ void for_each_voxel(const Outline& outline, int axis, const Visit& visit) {
   }
   const double first = std::floor(low), last = std::max(first, std::ceil(high) - 1);
   for (double plane = first; plane <= last; ++plane) {
-    Outline piece = outline;
-    for (const double side : {1.0, -1.0}) {  // above the lower plane, below the upper one
-      const double at = side > 0 ? plane : plane + 1;
-      Outline kept;
-      for (std::size_t v = 0; v < piece.size(); ++v) {
-        const Vec3 &a = piece[v], &b = piece[(v + 1) % piece.size()];
-        const double da = side * (a[axis] - at), db = side * (b[axis] - at);
-        if (da >= 0) kept.push_back(a);
-        if ((da > 0 && db < 0) || (da < 0 && db > 0)) kept.push_back(a + (b - a) * (da / (da - db)));
-      }
-      piece = std::move(kept);
-    }
+    const Outline piece = beside_plane(beside_plane(outline, axis, plane, 1), axis, plane + 1, -1);
     if (piece.size() >= 3) for_each_voxel(piece, axis + 1, visit);
   }
 }

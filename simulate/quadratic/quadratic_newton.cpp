@@ -206,6 +206,7 @@ class LargeDeflection {
   // m: how far moves lead the matter.
   static double largest_led(const QuadraticSystem& system) {
     double most = 0;
+    for (const Vec3& led : system.cut_displacement()) most = std::max(most, led.norm());
     for (const NitscheSupport& support : system.supports()) {
       if (support.tie->link) continue;
       for (const FacePoint& point : support.points)
@@ -389,6 +390,13 @@ class LargeDeflection {
 };
 
 }  // namespace
+
+bool follow_turns(const QuadraticSystem& system, const RunSettings& settings, const std::string& scene,
+                  const std::function<void(double, double)>& progress, QuadraticSolution& solution) {
+  LargeDeflection large(system, settings, progress, solution);
+  large.run(settings, scene);
+  return !large.weak_support();
+}
 
 bool solve_large(const QuadraticSystem& system, const RunSettings& settings, const std::string& scene,
                  const std::function<void(int, double)>& linear,

@@ -15,4 +15,10 @@ namespace flexel::simulate {
                                const std::function<void(double, double)>& progress,
                                QuadraticSolution& solution);
 
+// The same from a displacement near it (with a tangent that fits it roughly), of cells that turn, whether that matters or not. False where
+// the stiffness shows as indefinite.
+[[nodiscard]] bool follow_turns(const QuadraticSystem& system, const RunSettings& settings,
+                                const std::string& scene, const std::function<void(double, double)>& progress,
+                                QuadraticSolution& solution);
+
 }  // namespace flexel::simulate

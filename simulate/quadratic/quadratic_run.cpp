@@ -20,6 +20,7 @@
 #include "simulate/models/stiffness.h"
 #include "simulate/probes/probes.h"
 #include "simulate/probes/report.h"
+#include "simulate/quadratic/local_stress.h"
 #include "simulate/quadratic/quadratic_newton.h"
 #include "simulate/quadratic/quadratic_solve.h"
 #include "simulate/quadratic/quadratic_stress.h"
@@ -127,6 +128,62 @@ void refuse_too_large(const QuadraticSystem& system, const Body& body, const std
                   "bodies {}",
                   human_count(cells), human_count(held), human_count(system.bonds().size()), links),
       scene);
+}
+
+void count_work(const QuadraticSolution& solution, SimulateResult& result) {
+  result.load_steps = std::max(solution.load_steps, 1);
+  result.newton_iterations = solution.newton_iterations + 1;
+  result.cg_iterations = solution.iterations;
+  result.relative_residual = solution.relative_residual;
+}
+
+// s: `solving` of the linear solver.
+void share_time(const std::vector<ActiveEffect>& effects, double solving, bool explain,
+                SimulateResult& result, Progress& progress) {
+  for (const ActiveEffect& effect : effects)
+    result.shares.push_back({effect.name, effect.why, effect.seconds});
+  if (!explain) return;
+  std::vector<EffectShare> shares = result.shares;
+  shares.push_back({"linear solver", "", solving});
+  explain_times(shares, result.seconds, progress);
+}
+
+void refuse_closer_look(const QuadraticSystem& system, const Scene& scene, const SimulateOptions& options) {
+  if (!options.cut_box) return;
+  if (const std::string lacks = local_stress_lacks(system); !lacks.empty())
+    throw InputError(scene.name, "the closer look at the largest stress does not take " + lacks);
+}
+
+// The largest stress on finer cells around it. What the run has stays where they cannot be solved.
+void take_closer_look(const QuadraticSystem& system, const QuadraticSolution& solution, const Scene& scene,
+                      const SimulateOptions& options, const Stresses& field, Body& body,
+                      SimulateResult& result, Progress& progress) {
+  try {
+    progress.stage("largest stress");
+    LocalStressField found =
+        look_closer(system, solution, scene, options.cut_box, field, singular_elements(system), progress);
+    StressSummary& stress = found.found.stress;
+    if (!result.stress->beside.empty() && !found.found.bar) {
+      result.no_local_stress =
+          fmt::format("it lies beside {}, and farther away none comes to a limit", result.stress->beside);
+      return;
+    }
+    if (found.found.values.empty()) return;
+    SimulateResult same;
+    report_stress(system.problem(), found.field, body, same);
+    if (same.stress->yield_share && same.stress->value > 0)
+      stress.yield_share = *same.stress->yield_share * stress.value / same.stress->value;
+    result.stress->beside.clear();
+    if (same.stress->value > stress.value) {
+      result.stress = same.stress;
+      mark_singular(body, singular_elements(system), result, kBesideInField);
+    }
+    result.local_stress = std::move(found.found);
+  } catch (const InputError& error) {
+    result.no_local_stress = error.what();
+  } catch (const DivergedError& error) {
+    result.no_local_stress = error.what();
+  }
 }
 
 // What a run finds at the vertices goes by these names.
@@ -250,11 +307,12 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   report_strays(fragments, result, progress);
   const QuadraticSystem system(problem, scene);
   refuse_too_large(system, body, scene.name);
+  refuse_closer_look(system, scene, options);
   for (const std::string& warning : system.warnings()) progress.warn(warning);
   refuse_loose_fragments(fragments, body, system.tied_elements(), system.bonded_elements(), scene.name);
   double solving = 0;
   const QuadraticSolution solution = quadratic_equilibrium(system, scene, solving, progress);
-  const StopWaits answered;
+  std::optional<StopWaits> answered(std::in_place);
   name_materials(body, problem.materials);
   State state;
   state.displacement = element_displacement(system, solution);
@@ -264,8 +322,10 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   sum_up_imbalance(result);
   for (const std::string& warning : warnings_of(result)) progress.warn(scene.name + ": " + warning);
   if (options.stress) tell_replaced_columns(body, progress);
-  if (options.stress) report_stress(problem, field_stresses(system, solution, state), body, result);
-  if (options.estimate) mark_singular(body, singular_elements(system), result, kBesideInField);
+  Stresses field;
+  if (options.stress) report_stress(problem, field = field_stresses(system, solution, state), body, result);
+  if (options.estimate || options.cut_box)
+    mark_singular(body, singular_elements(system), result, kBesideInField);
   const StiffnessPattern pattern =
       stiffness_pattern(body, active_cells(problem), connection_rows({}, body.element_count()), {}, false);
   carry_strays(fragments, problem, pattern.stencil, state);
@@ -278,18 +338,12 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   if (linear_reach != nullptr) *linear_reach = result.largest_displacement / solution.amplification;
   result.mass = mass_of(problem);
   refuse_not_finite(result, scene.name);
-  result.load_steps = std::max(solution.load_steps, 1);
-  result.newton_iterations = solution.newton_iterations + 1;
-  result.cg_iterations = solution.iterations;
-  result.relative_residual = solution.relative_residual;
+  count_work(solution, result);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
-  for (const ActiveEffect& effect : effects)
-    result.shares.push_back({effect.name, effect.why, effect.seconds});
-  if (options.explain) {
-    std::vector<EffectShare> shares = result.shares;
-    shares.push_back({"linear solver", "", solving});
-    explain_times(shares, result.seconds, progress);
-  }
+  share_time(effects, solving, options.explain, result, progress);
+  answered.reset();
+  if (options.cut_box && result.stress)
+    take_closer_look(system, solution, scene, options, field, body, result, progress);
   return result;
 }
 

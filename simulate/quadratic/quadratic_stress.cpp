@@ -242,7 +242,7 @@ std::vector<StressedSample> stressed_samples(const QuadraticSystem& system) {
   const std::vector<std::uint32_t>& cells = system.nodes().cells;
   const Body& body = system.problem().body;
   const std::vector<std::uint8_t> held = system.held_elements();
-  for (SurfaceSample& sample : surface_samples(body, system.pressure())) {
+  for (SurfaceSample& sample : surface_samples(body, system.pressure(), system.box())) {
     const auto cell = std::lower_bound(cells.begin(), cells.end(), sample.cell);
     if (cell == cells.end() || *cell != sample.cell) continue;
     const auto& corners = body.cell_elements[sample.cell];
@@ -360,10 +360,11 @@ void set_vertices(const Surface& surface, const std::vector<StressedSample>& sam
 
 // The largest of each part's samples is that of the nearest element of its cell, and of the nearest vertex.
 void keep_largest(const QuadraticSystem& system, const std::vector<StressedSample>& samples,
-                  Stresses& found) {
+                  const VoxelRange* core, Stresses& found) {
   const Body& body = system.problem().body;
   std::vector<const StressedSample*> largest(body.parts.size(), nullptr);
   for (const StressedSample& each : samples) {
+    if (core != nullptr && !core->contains(system.lattice(each.cell).to_lattice(each.sample.at))) continue;
     const StressedSample*& most = largest[system.part_of(each.cell)];
     if (most == nullptr || von_mises(each.stress) > von_mises(most->stress)) most = &each;
   }
@@ -383,8 +384,8 @@ void keep_largest(const QuadraticSystem& system, const std::vector<StressedSampl
 
 }  // namespace
 
-Stresses field_stresses(const QuadraticSystem& system, const QuadraticSolution& solution,
-                        const State& state) {
+Stresses field_stresses(const QuadraticSystem& system, const QuadraticSolution& solution, const State& state,
+                        const VoxelRange* core) {
   const QuadraticNodes& nodes = system.nodes();
   const FieldStress field(system, solution);
   Stresses found = stresses(system.problem(), state);  // for the points that elements stand for
@@ -397,7 +398,7 @@ Stresses field_stresses(const QuadraticSystem& system, const QuadraticSolution& 
   set_samples(field, of_cells, samples);
   set_elements(system, field, of_cells, samples, found);
   set_vertices(system.problem().body.surface, samples, found);
-  keep_largest(system, samples, found);
+  keep_largest(system, samples, core, found);
   return found;
 }
 

@@ -14,7 +14,8 @@ namespace flexel::simulate {
 // As `stresses()` defines them. Of a cell in the middle of its matter; of an element there where it lies in the matter, else
 // at the nearest point of the surface in the cells around it. Samples: simulate/matter/surface_samples.h. Of a vertex the largest (von
 // Mises) on the smooth surfaces that meet there. The largest of a part's samples is also that of the nearest element and vertex.
+// `core`: of a submodel, where a sample may be the largest; null: everywhere.
 [[nodiscard]] Stresses field_stresses(const QuadraticSystem& system, const QuadraticSolution& solution,
-                                      const State& state);
+                                      const State& state, const VoxelRange* core = nullptr);
 
 }  // namespace flexel::simulate

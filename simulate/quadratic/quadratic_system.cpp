@@ -33,8 +33,13 @@ Moments body_moments(const Body& body, std::size_t place) {
 
 }  // namespace
 
-QuadraticSystem::QuadraticSystem(const Problem& problem, const Scene& scene)
-    : problem_(problem), scene_(scene), nodes_(quadratic_nodes(problem.body, active_cells(problem))) {
+QuadraticSystem::QuadraticSystem(const Problem& problem, const Scene& scene, const Surroundings* surroundings)
+    : problem_(problem),
+      scene_(scene),
+      nodes_(quadratic_nodes(problem.body, active_cells(problem))),
+      cut_{surroundings, {}, {}} {
+  if (cut_.surroundings != nullptr) cut_.nodes = cut_.surroundings->cut_nodes(nodes_);
+  cut_.displacement.assign(cut_.nodes.size(), Vec3::Zero());
   const Body& body = problem.body;
   const std::vector<std::uint32_t> part = cell_parts(body);
   for (const std::uint32_t c : nodes_.cells) {
@@ -99,8 +104,9 @@ void QuadraticSystem::place_support(const Tie& tie, const Selected& selected) {
   NitscheSupport support{&tie, {}, {}};
   for (const std::uint32_t p : selected.polygons) pressure_[p] = kUnknownPressure;
   if (!selected.polygons.empty()) {
-    support.points = in_firm_cells(problem_.body, nodes_, face_points(problem_, nodes_, selected.polygons));
-    if (support.points.empty())
+    support.points =
+        in_firm_cells(problem_.body, nodes_, face_points(problem_, nodes_, selected.polygons, box()));
+    if (support.points.empty() && cut_.surroundings == nullptr)
       throw InputError(tie.origin, fmt::format("\"{}\": no matter lies under the selected surface; use a "
                                                "smaller spacing",
                                                tie.name));
@@ -311,23 +317,17 @@ void QuadraticSystem::place_loads(const std::vector<Load>& loads) {
           fmt::format("load \"{}\": model \"quadratic\" takes loads on faces, groups and sides; {} "
                       "selects elements",
                       load.name, describe(load.where)));
-    const std::vector<FacePoint> points = face_points(problem_, nodes_, selected.polygons);
-    if (points.empty())
+    const std::vector<FacePoint> points = face_points(problem_, nodes_, selected.polygons, box());
+    if (points.empty() && cut_.surroundings == nullptr)
       throw InputError(load.origin,
                        fmt::format("load \"{}\": no matter lies under the selected surface; use a "
                                    "smaller spacing",
                                    load.name));
-    check_area(load, selected.polygons, points);
+    if (cut_.surroundings == nullptr) check_area(load, selected.polygons, points);
     for (const std::uint32_t p : selected.polygons) pressure_[p] += load.pressure.value_or(kUnknownPressure);
-    std::vector<Vec3> forces;
     std::vector<LoadedPoint> loaded;
-    for (const FacePoint& point : points) {
-      if (load.pressure)
-        forces.push_back(-*load.pressure * point.area_vector);
-      else
-        loaded.push_back({point.position, point.area_vector.norm(), point.area_vector.normalized()});
-    }
-    if (!load.pressure) forces = load_forces(load, loaded);
+    const std::vector<Vec3> forces =
+        forces_at(load, cut_.surroundings == nullptr ? points : all_points(selected.polygons), loaded);
     for (std::size_t q = 0; q < points.size(); ++q) {
       const QuadraticShape shape = quadratic_shape(points[q].at);
       for (std::size_t n = 0; n < kQuadraticNodes; ++n)
@@ -336,6 +336,28 @@ void QuadraticSystem::place_loads(const std::vector<Load>& loads) {
     if (load.follower) made.follower = follower(load, points, loaded);
     loads_.push_back(std::move(made));
   }
+}
+
+// N, at each of the points that the load acts on.
+std::vector<Vec3> QuadraticSystem::forces_at(const Load& load, const std::vector<FacePoint>& points,
+                                             std::vector<LoadedPoint>& loaded) const {
+  std::vector<Vec3> forces;
+  for (const FacePoint& point : points) {
+    if (load.pressure)
+      forces.push_back(-*load.pressure * point.area_vector);
+    else
+      loaded.push_back({point.position, point.area_vector.norm(), point.area_vector.normalized()});
+  }
+  return load.pressure ? forces : load_forces(load, loaded);
+}
+
+// Its own first.
+std::vector<FacePoint> QuadraticSystem::all_points(const std::vector<std::uint32_t>& polygons) const {
+  std::vector<FacePoint> points = face_points(problem_, nodes_, polygons, box());
+  if (cut_.surroundings == nullptr) return points;
+  const std::vector<FacePoint> beyond = cut_.surroundings->beyond(polygons);
+  points.insert(points.end(), beyond.begin(), beyond.end());
+  return points;
 }
 
 std::unique_ptr<FollowerLoad> QuadraticSystem::follower(const Load& load,
@@ -544,6 +566,7 @@ std::vector<std::uint8_t> QuadraticSystem::held() const {
     for (const std::uint32_t n : support.nodes)
       for (std::size_t axis = 0; axis < 3; ++axis)
         if (support.tie->axes[axis]) held[n] = static_cast<std::uint8_t>(held[n] | 1u << axis);
+  for (const std::uint32_t n : cut_.nodes) held[n] = 7;
   return held;
 }
 
@@ -620,6 +643,7 @@ std::vector<Vec3> QuadraticSystem::prescribed(double share) const {
         if (support.tie->axes[axis])
           value[n][static_cast<Eigen::Index>(axis)] = led[static_cast<Eigen::Index>(axis)];
     }
+  for (std::size_t i = 0; i < cut_.nodes.size(); ++i) value[cut_.nodes[i]] = share * cut_.displacement[i];
   return value;
 }
 

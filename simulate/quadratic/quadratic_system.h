@@ -23,6 +23,15 @@ struct NodalLoad {
   void add_to(const std::vector<Vec3>& displacement, double share, std::vector<Vec3>& sum) const;
 };
 
+// What surrounds a submodel: matter beyond its cut faces, of which the displacement is known (simulate/quadratic/submodel.h).
+struct Surroundings {
+  VoxelRange box;
+  // Nodes on the cut faces.
+  std::function<std::vector<std::uint32_t>(const QuadraticNodes&)> cut_nodes;
+  // Points of these polygons under which the matter beyond lies.
+  std::function<std::vector<FacePoint>(const std::vector<std::uint32_t>&)> beyond;
+};
+
 // Stiffness and inertia of what is not matter, of the material's: slivers stay regular.
 constexpr double kOutside = 1e-6;
 
@@ -30,13 +39,24 @@ class QuadraticSystem {
  public:
   // Throws InputError: cells that the surface cuts without moments, a support or load under which no matter lies, a
   // [[bond]] of parts that do not touch.
-  // Keeps references.
-  QuadraticSystem(const Problem& problem, const Scene& scene);
+  // Keeps references. `surroundings`: of a submodel. Its loads are shares of those of the whole surface, and supports may
+  // lie beyond.
+  QuadraticSystem(const Problem& problem, const Scene& scene, const Surroundings* surroundings = nullptr);
   QuadraticSystem(const QuadraticSystem&) = delete;
   QuadraticSystem& operator=(const QuadraticSystem&) = delete;
 
   // The stiffness with supports, whose penalty is `safety` times the usual one.
   [[nodiscard]] QuadraticOperator stiffness(double safety) const;
+  // What a submodel is of; null: the whole.
+  [[nodiscard]] const VoxelRange* box() const {
+    return cut_.surroundings == nullptr ? nullptr : &cut_.surroundings->box;
+  }
+  // (cut nodes) ascending, of a submodel; and where they go [m].
+  [[nodiscard]] const std::vector<std::uint32_t>& cut_nodes() const { return cut_.nodes; }
+  [[nodiscard]] const std::vector<Vec3>& cut_displacement() const { return cut_.displacement; }
+  void lead_cut_nodes(std::vector<Vec3> displacement) { cut_.displacement = std::move(displacement); }
+  // Points of the selected polygons, beyond the cut faces too.
+  [[nodiscard]] std::vector<FacePoint> all_points(const std::vector<std::uint32_t>& polygons) const;
   // What the stiffness has of cells where there is no matter, so that slivers stay regular.
   [[nodiscard]] CellProducts<double> outside() const;
   // (nodes x 3) N: loads and what led faces ask for.
@@ -136,6 +156,8 @@ class QuadraticSystem {
   void place_loads(const std::vector<Load>& loads);
   [[nodiscard]] std::unique_ptr<FollowerLoad> follower(const Load& load, const std::vector<FacePoint>& points,
                                                        const std::vector<LoadedPoint>& loaded) const;
+  [[nodiscard]] std::vector<Vec3> forces_at(const Load& load, const std::vector<FacePoint>& points,
+                                            std::vector<LoadedPoint>& loaded) const;
   void check_area(const Load& load, const std::vector<std::uint32_t>& polygons,
                   const std::vector<FacePoint>& points);
   void add_gravity(const Vec3& acceleration);
@@ -165,6 +187,11 @@ class QuadraticSystem {
   std::vector<NodalLoad> loads_;
   std::vector<double> pressure_;  // (polygons)
   std::vector<std::string> warnings_;
+  struct Cut {
+    const Surroundings* surroundings = nullptr;  // null: the whole
+    std::vector<std::uint32_t> nodes;
+    std::vector<Vec3> displacement;  // (nodes x 3) m
+  } cut_;
 };
 
 }  // namespace flexel::simulate

@@ -11,7 +11,12 @@ struct Body;  // formats/lattice/body.h
 
 namespace flexel::simulate {
 
+struct LatticeBox;  // simulate/matter/voxel_pieces.h
 struct Checkpoint;  // simulate/time/checkpoint.h
+
+// The matter of the run's part in a box of a lattice, with the part's whole surface and exact moments (voxelize/voxelize_box.h). Throws
+// InputError.
+using CutBox = std::function<Body(const LatticeBox& box)>;
 
 struct SimulateOptions {
   int threads = 0;            // 0: every core
@@ -38,6 +43,8 @@ struct SimulateOptions {
   // Timed runs: called with each frame's body and time [s], on the thread of the run; the body is the run's own, and
   // another after the call.
   std::function<void(const Body& body, double time)> on_frame = {};
+  // Model `quadratic`: what the largest stress is looked at closer with (docs/theory/local-stress.md); null: it is not.
+  CutBox cut_box = {};
 };
 
 }  // namespace flexel::simulate

@@ -65,6 +65,18 @@ struct StressSummary {     // of the largest von Mises stress
   [[nodiscard]] bool lacks_bending() const { return thin_walls > 0.2; }
 };
 
+// The largest von Mises stress, looked at on finer cells around it (simulate/quadratic/local_stress.h).
+struct LocalStress {
+  StressSummary stress;
+  std::vector<double>
+      values;  // Pa, on the finest cells first, the run's own last; none: it lies where nobody looked closer
+  double spacing = 0;  // m, of the finest
+  std::string beside;  // a singularity that the finer cells show; "" if not
+  std::optional<Bar> bar;
+  std::size_t places = 0, cells = 0;  // that were looked at; of all finer lattices together
+  double seconds = 0;
+};
+
 struct SettleSummary {  // of equilibrium with contact (simulate/time/dynamic_relaxation.h)
   std::uint64_t steps = 0;
   double residual = 0;   // forces left over, relative to loads and reactions
@@ -140,6 +152,8 @@ struct SimulateResult : SolverCounts {
   std::optional<TimedSummary> timed;
   std::optional<SettleSummary> settled;
   std::optional<ModesSummary> modes;
+  std::optional<LocalStress> local_stress;
+  std::string no_local_stress;  // why it was not looked closer; "" where it was, or nobody asked
 };
 
 }  // namespace flexel::simulate

@@ -4,7 +4,7 @@ import json
 import math
 import pathlib
 
-from harness import SCENE, Skip, ascii_stl, box_triangles, expect, expect_ok, main, run, write
+from harness import SCENE, Skip, ascii_stl, box_triangles, expect, expect_error, expect_ok, main, run, write
 
 MATERIAL = """material = "m"
 model = "quadratic"
@@ -114,6 +114,60 @@ def test_plate_with_a_hole():
     expect(abs(summary["largest_von_mises"] / 27.43e6 - 1) < 0.03, summary["largest_von_mises"])
     x, y, _ = summary["largest_von_mises_at"]
     expect(abs(math.hypot(x, y) - 5e-3) < 2e-5 and x < 1e-3, (x, y))
+
+
+def look_closer(part, size, scene, *options):
+    write("scene.toml", scene)
+    done = expect_ok(run("flexel", "deform", part, "--scene", "scene.toml", "--size", size, "--refine-stress", "--summary", "s.json", "-o", "bent.vtu", "--verbose", *options))
+    return json.loads(pathlib.Path("s.json").read_text())["simulate"], done
+
+
+def test_a_closer_look_at_a_hole():
+    """The same plate with one cell a radius: within 3 %, with a narrow bar, and one figure in summary, body and mapped file."""
+    meshio = has_meshio()
+    part = quarter("hole.obj", arc(5, 5), square(50), 5)
+    summary, done = look_closer(part, "5 mm", MATERIAL + QUARTER + PLANE + '[[load]]\nwhere = "xmax"\npressure = "-10 MPa"\n')
+    found, bar = summary["largest_von_mises"], summary["error_bars"]["largest_von_mises"]["bar"]
+    expect(abs(found / 27.43e6 - 1) < 0.03, found)
+    expect(bar is not None and abs(found - 27.43e6) < bar < 0.05 * found, f"{found} +- {bar}")
+    local = summary["largest_von_mises_local"]
+    expect(local["values"][0] == found and local["values"][-1] < 0.9 * found, local)
+    expect("looked at closer" in done.out.decode() + done.err, done)
+    expect(abs(max(meshio.read("bent.vtu").point_data["von_mises"]) / found - 1) < 1e-9, "the body's largest")
+    expect(abs(max(mapped(meshio).point_data["von_mises"]) / found - 1) < 1e-9, "the mapped surface's largest")
+
+
+def test_a_closer_look_beside_a_clamp_finds_no_limit():
+    part = write("bar.stl", ascii_stl(box_triangles((60, 10, 10))))
+    summary, _ = look_closer(part, "4 mm", MATERIAL + '[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = [0, 0, "-10 N"]\n')
+    expect(summary["largest_von_mises_beside"] == "a support", summary)
+    expect(summary["error_bars"]["largest_von_mises"]["bar"] is None, summary["error_bars"])
+    expect(summary["largest_von_mises_local_none"] == "it lies beside a support, and farther away none comes to a limit", summary)
+
+
+def test_a_closer_look_at_the_edge_of_a_punch_finds_no_limit():
+    """A block pressed down on a half of its upper side, which cannot rise: at the end of that half the pressure has no limit."""
+    part = quarter("block.obj", lambda s: (40 - 40 * s, 0), lambda s: (40 - 40 * s, 20), 20, 8)
+    lines = pathlib.Path(part).read_text().splitlines()
+    after = lines.index("g outer") + 4
+    pathlib.Path(part).write_text("\n".join(lines[:after + 1] + ["g free"] + lines[after + 1:]) + "\n")
+    scene = MATERIAL + PLANE + '[[fix]]\nwhere = "start"\naxes = "x"\n[[fix]]\nwhere = "outer"\naxes = "y"\n[[load]]\nwhere = "inner"\npressure = "10 MPa"\n'
+    summary, done = look_closer(part, "5.3 mm", scene)
+    expect("largest_von_mises_local" in summary, summary)
+    expect(summary["error_bars"]["largest_von_mises"]["bar"] is None, summary)
+    expect("does not converge" in done.out.decode() + done.err, done)
+
+
+def test_a_closer_look_is_refused_by_name():
+    part = write("bar.stl", ascii_stl(box_triangles((60, 10, 10))))
+    common = ("flexel", "deform", part, "--fix", "xmin", "--material", "steel", "--size", "4 mm", "--refine-stress", "-o", "bent.stl")
+    expect_error(run(*common, "--push", "xmax: 0 0 -10 N", "--model", "cells"), "flexel", '--refine-stress is for model "quadratic": add --model quadratic')
+    expect_error(run(*common[:7], *common[9:], "--push", "xmax: 0 0 -10 N", "--model", "quadratic", "--within", "9s"), "flexel",
+                 "--refine-stress takes time of its own: leave --within out")
+    linked = MATERIAL + '[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = [0, 0, "-10 N"]\nlink = "rigid"\n'
+    write("linked.toml", linked)
+    expect_error(run("flexel", "deform", part, "--scene", "linked.toml", "--size", "4 mm", "--refine-stress", "-o", "bent.stl"), "flexel",
+                 "the closer look at the largest stress does not take rigid links and rigid parts")
 
 
 def test_nafems_le1():

@@ -74,6 +74,9 @@ struct Voxels {
 // Fills first_piece.
 void number_pieces(Voxels& voxels);
 
+// Leaves out the voxels outside lower <= (i, j, k) < upper.
+void keep_box(Voxels& voxels, const Index3& lower, const Index3& upper);
+
 // Whether piece `a` of slab `in_a` and piece `b` of slab `in_b` (numbers within their slabs) of the
 // neighbouring voxel in direction +axis meet: matter continues from one to the other through the voxels'
 // common face.

@@ -88,7 +88,7 @@ std::vector<FacePoint> in_firm_cells(const Body& body, const QuadraticNodes& nod
 }
 
 std::vector<FacePoint> face_points(const Problem& problem, const QuadraticNodes& nodes,
-                                   const std::vector<std::uint32_t>& polygons) {
+                                   const std::vector<std::uint32_t>& polygons, const VoxelRange* range) {
   const Body& body = problem.body;
   const Triangles triangles = triangulate(body.surface);
   std::vector<std::uint8_t> chosen(body.surface.polygon_count(), 0);
@@ -106,6 +106,8 @@ std::vector<FacePoint> face_points(const Problem& problem, const QuadraticNodes&
     Outline corners;
     for (const std::uint32_t v : triangles.corners[t])
       corners.push_back(part.lattice.to_lattice(body.surface.vertices[v]));
+    if (range != nullptr) corners = in_range(corners, *range);
+    if (corners.size() < 3) continue;
     for_each_voxel(corners, 0, [&](const Outline& piece) {
       const std::optional<CellPoint> found = (*locate)(part.lattice.to_world(middle_of(piece)));
       if (!found) return;

@@ -16,8 +16,10 @@ struct FacePoint {
 };
 
 // Of the selected polygons: each is cut by the voxels, and each piece gets Gauss points; none where no cell that resists lies under.
+// `range`: of the polygons only what lies there; null: all.
 [[nodiscard]] std::vector<FacePoint> face_points(const Problem& problem, const QuadraticNodes& nodes,
-                                                 const std::vector<std::uint32_t>& polygons);
+                                                 const std::vector<std::uint32_t>& polygons,
+                                                 const VoxelRange* range = nullptr);
 
 // Gauss's points of a convex polygon (m, world frame), each with its share of the area vector. `small`: beside a voxel,
 // where fewer do (is_small(), of the polygon in lattice coordinates).
