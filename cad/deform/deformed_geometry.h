@@ -25,9 +25,9 @@ struct ShapeMap {
 };
 
 struct FitOptions {
-  double tolerance = 0;             // of surfaces, in the unit of the shape
-  double spacing = 0;               // of the lattice: no span of knots is to be much longer
-  std::function<void()> face_done;  // called, from any thread, as each is fitted
+  double tolerance = 0;                  // of surfaces, in the unit of the shape
+  double spacing = 0;                    // of the lattice: no span of knots is to be much longer
+  std::function<void()> face_done = {};  // called, from any thread, as each is fitted
 };
 
 struct DeformedFace {
