@@ -385,7 +385,7 @@ class GoalRuns {
     } catch (const TimeoutError&) {
       if (!limit || !limit->passed() || !model_.may_take_back()) throw;
       limit.reset();
-      if (std::optional<SolvedRun> run = with_few_cells(goes_on)) return *std::move(run);
+      if (std::optional<SolvedRun> run = with_few_cells(*size, goes_on)) return *std::move(run);
       (void)model_.take_back("it takes too long");
     }
     limit.reset();
@@ -454,16 +454,20 @@ class GoalRuns {
   }
 
   // Of model `quadratic`, where the usual count takes too long: a few such cells bend far better than those of model `cells` do
-  // where walls are thin. Nothing where these fail too.
-  std::optional<SolvedRun> with_few_cells(const GoesOn& goes_on) {
+  // where walls are thin. Nothing where these fail too, or are no fewer than those of the size that was `tried`.
+  std::optional<SolvedRun> with_few_cells(double tried, const GoesOn& goes_on) {
     constexpr double kSecondTrial = 0.3;  // of the time
     few_ = true;
     try {
       const StopAfter limit(patience(kSecondTrial, kSecondTrial), "--within");
-      SolvedRun run = solve(made(std::nullopt).size, goes_on);
-      model_.keep();
-      return run;
+      if (const double size = made(std::nullopt).size; size > tried) {
+        SolvedRun run = solve(size, goes_on);
+        model_.keep();
+        return run;
+      }
     } catch (const InputError&) {
+    } catch (const simulate::OverloadError&) {
+      throw;
     } catch (const DivergedError&) {
     } catch (const TimeoutError&) {  // a limit of the whole command ends what comes next
     }

@@ -62,51 +62,16 @@ class LargeDeflection {
 
   void run(const RunSettings& settings, const std::string& scene) {
     const std::vector<Vec3> linear = solution_.displacement;
-    std::vector<Vec3> before(linear.size(), Vec3::Zero()), now = before;
     const Eigen::VectorXd linear_links = links_.motions();
-    Eigen::VectorXd links_before = 0 * linear_links, links_now = links_before;
     links_.take_small(false);
     if (settings.load_steps == 1) refuse_out_of_proportion(scene);
-    const int more = links_.any() ? kMoreWithLinks : 1;
-    const int most = settings.newton_iterations.value_or(more * (reach_ > extent_ ? 40 : 100));
-    double done = 0, last = 0;
-    // the linear answer to a move that turns follows the chord of its end, which says nothing of the way there
-    const bool turned = angle_ > kFirstTurn;
-    const double longest = std::min(1. / std::max(settings.load_steps, 1), turned ? kFirstTurn / angle_ : 1.);
-    double step = std::min(longest, kFirstTurn / std::max(largest_turn(linear), 1e-300));
-    while (done < 1) {
-      const double share = done + step > 1 - 1e-9 ? 1 : done + step;
-      const double ahead = last > 0 ? (share - done) / last : 0;
-      std::vector<Vec3> guess =
-          done > 0 ? further(now, before, ahead) : further(linear, linear, 0, turned ? 0 : share);
-      links_.set_motions(done > 0 ? Eigen::VectorXd(links_now + ahead * (links_now - links_before))
-                                  : Eigen::VectorXd((turned ? 0 : share) * linear_links));
-      begin_step(now, done, guess, share);
-      const int iterations = reach_with_links(share, guess);
-      if (iterations > kMostIterations) {
-        step = (share - done) / 2;
-        if (step < kLeastStep * longest ||
-            solution_.iterations - link_iterations_ > more * kMostLinearInAll ||
-            solution_.newton_iterations > most + 10 * solution_.load_steps) {
-          if (weak_support_) return;
-          fail(scene, done);
-        }
-        continue;
-      }
-      ++solution_.load_steps;
-      before = now;
-      now = guess;
-      links_before = links_now;
-      links_now = links_.motions();
-      last = share - done;
-      done = share;
-      count_turns(now);
-      weak_support_ = false;
-      if (iterations <= kFewIterations) step = std::min(2 * step, longest);
+    double done = load_in_steps(settings, linear, linear_links);
+    // past buckling true stresses and looser solutions sometimes arrive where the others do not
+    if (done < 1 && !weak_support_ && reach_ <= extent_ && !settings.newton_iterations) {
+      foretells_ = false;
+      done = std::max(done, load_in_steps(settings, linear, linear_links));
     }
-    solution_.displacement = now;
-    if (!turned && reach_ > 0) solution_.amplification = largest(now) / reach_;
-    solution_.turn = corotation_.turns();
+    if (done < 1 && !weak_support_) fail(scene, done);
   }
 
   // Of loads that follow, so that whole turns are told.
@@ -203,6 +168,55 @@ class LargeDeflection {
                                     scene, human_share(done), why));
   }
 
+  // From rest. The share of the load at which there is an equilibrium.
+  double load_in_steps(const RunSettings& settings, const std::vector<Vec3>& linear,
+                       const Eigen::VectorXd& linear_links) {
+    std::vector<Vec3> before(linear.size(), Vec3::Zero()), now = before;
+    Eigen::VectorXd links_before = 0 * linear_links, links_now = links_before;
+    const int earlier = solution_.newton_iterations, earlier_linear = solution_.iterations - link_iterations_;
+    solution_.load_steps = 0;
+    solution_.load_turn.clear();
+    const int more = links_.any() ? kMoreWithLinks : 1;
+    const int most = settings.newton_iterations.value_or(more * (reach_ > extent_ ? 40 : 100));
+    double done = 0, last = 0;
+    // the linear answer to a move that turns follows the chord of its end, which says nothing of the way there
+    const bool turned = angle_ > kFirstTurn;
+    const double longest = std::min(1. / std::max(settings.load_steps, 1), turned ? kFirstTurn / angle_ : 1.);
+    double step = std::min(longest, kFirstTurn / std::max(largest_turn(linear), 1e-300));
+    while (done < 1) {
+      const double share = done + step > 1 - 1e-9 ? 1 : done + step;
+      const double ahead = last > 0 ? (share - done) / last : 0;
+      std::vector<Vec3> guess =
+          done > 0 ? further(now, before, ahead) : further(linear, linear, 0, turned ? 0 : share);
+      links_.set_motions(done > 0 ? Eigen::VectorXd(links_now + ahead * (links_now - links_before))
+                                  : Eigen::VectorXd((turned ? 0 : share) * linear_links));
+      begin_step(now, done, guess, share);
+      const int iterations = reach_with_links(share, guess);
+      if (iterations > kMostIterations) {
+        step = (share - done) / 2;
+        if (step < kLeastStep * longest ||
+            solution_.iterations - link_iterations_ - earlier_linear > more * kMostLinearInAll ||
+            solution_.newton_iterations - earlier > most + 10 * solution_.load_steps)
+          return done;
+        continue;
+      }
+      ++solution_.load_steps;
+      before = now;
+      now = guess;
+      links_before = links_now;
+      links_now = links_.motions();
+      last = share - done;
+      done = share;
+      count_turns(now);
+      weak_support_ = false;
+      if (iterations <= kFewIterations) step = std::min(2 * step, longest);
+    }
+    solution_.displacement = now;
+    if (!turned && reach_ > 0) solution_.amplification = largest(now) / reach_;
+    solution_.turn = corotation_.turns();
+    return done;
+  }
+
   // m: how far moves lead the matter.
   static double largest_led(const QuadraticSystem& system) {
     double most = 0;
@@ -246,7 +260,7 @@ class LargeDeflection {
   void begin_step(const std::vector<Vec3>& now, double done, std::vector<Vec3>& guess, double share) {
     lead(share, guess);
     if (!corotation_.residual(now, done, solution_.unbalanced)) return;  // the next residual tells
-    corotation_.foretell(now, further(guess, now, 1, 0), share - done);
+    if (foretells_) corotation_.foretell(now, further(guess, now, 1, 0), share - done);
   }
 
   // Equilibrium at a share of the load, from `u`. How many iterations it took; more than kMostIterations: there was none.
@@ -270,7 +284,7 @@ class LargeDeflection {
       const double turn = largest_turn(change);
       const double part = turn > kMostTurn ? kMostTurn / turn : 1;
       if (part < 1) parallel_for_each(change.size(), [&](std::size_t n) { change[n] *= part; });
-      corotation_.foretell(u, change, 0);
+      if (foretells_) corotation_.foretell(u, change, 0);
       parallel_for_each(u.size(), [&](std::size_t n) { u[n] += change[n]; });
       ++solution_.newton_iterations;
     }
@@ -342,7 +356,8 @@ class LargeDeflection {
   // Share of `residual`, which is beside the loads. The next residual is of the order of the square of this one, and need be
   // no less than what was asked for.
   [[nodiscard]] double forcing(double residual) const {
-    return std::min({kLoosest, kLoosestOfLoads / residual, std::max(residual, 0.3 * tolerance_ / residual)});
+    const double loosest = foretells_ ? std::min(kLoosest, kLoosestOfLoads / residual) : kLoosest;
+    return std::min(loosest, std::max(residual, 0.3 * tolerance_ / residual));
   }
 
   // The stiffness with what loads add that follow the shape, at `u` and the share of the load that is
@@ -383,6 +398,7 @@ class LargeDeflection {
   double angle_ = 0;               // rad, of moves
   bool indefinite_ = false;        // the last tangent
   bool weak_support_ = false;
+  bool foretells_ = true;      // the stresses of the tangent, which take closer linear solutions
   std::vector<Vec3> made_at_;  // (nodes x 3) m, where the preconditioner was made; none: at rest
   LinkBalance links_;
   double share_ = 1;         // of the load, that reach() looks for
