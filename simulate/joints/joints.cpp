@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "base/error.h"
 #include "base/nearest_word.h"
@@ -162,6 +164,21 @@ std::vector<EffectPower> Joints::powers(bool after) const {
 
 void Joints::restore(const std::vector<double>& memory) {
   if (!system_->restore(memory)) throw InputError("the checkpoint's joints are not those of its scene");
+}
+
+std::vector<double> Joints::transfer_state() const {
+  std::vector<double> travelled = system_->memory();  // begins with them
+  travelled.resize(system_->places().size());
+  return travelled;
+}
+
+void Joints::restore_from(const std::vector<double>& travelled) {
+  constexpr double kWhole = 2 * std::numbers::pi;
+  std::vector<double> memory = system_->memory();
+  for (std::size_t p = 0; p < system_->places().size() && p < travelled.size(); ++p)
+    if (system_->places()[p].joint.kind != JointKind::slider)
+      memory[p] += kWhole * std::round((travelled[p] - memory[p]) / kWhole);
+  restore(memory);
 }
 
 std::vector<std::string> Joints::history_columns() const {

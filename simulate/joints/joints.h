@@ -28,6 +28,9 @@ class Joints : public Effect {
   [[nodiscard]] std::vector<EffectPower> powers(bool after) const override;
   [[nodiscard]] std::vector<double> memory() const override { return system_->memory(); }
   void restore(const std::vector<double>& memory) override;
+  // How far joints have turned and slid: whole turns are not seen in a body.
+  [[nodiscard]] std::vector<double> transfer_state() const override;
+  void restore_from(const std::vector<double>& travelled) override;
   // Of each joint: force and torque on its first part, about its point; angle or travel, and the couple of motors.
   [[nodiscard]] std::vector<std::string> history_columns() const override;
   [[nodiscard]] std::vector<double> history_values(const State&, const std::vector<Vec3>&) override;

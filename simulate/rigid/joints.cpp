@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <limits>
 #include <numbers>
 #include <numeric>
@@ -334,7 +335,22 @@ void JointSystem::find(std::span<JointedBody> bodies, const Rows& all, const std
       places_.front().joint.name, drift));
 }
 
-// Motors that would need more than their couple get that, and turn slower.
+namespace {
+
+// How much faster a motor is to turn [rad/s].
+double missing_speed(const JointSystem::Place& place, const Vec3& axis, std::span<const JointedBody> bodies) {
+  double missing = *place.joint.speed;
+  for (std::size_t s = 0; s < 2; ++s)
+    if (const std::size_t b = place.sides[s].body; b != JointSystem::kWorld)
+      missing += (s == 0 ? -1 : 1) *
+                 axis.dot(angular_velocity(*bodies[b].body, bodies[b].body->pose.rotation, bodies[b].spin));
+  return missing;
+}
+
+}  // namespace
+
+// Motors that would need more than their couple get that, and turn slower; so where the joints do not let them have their
+// speed at all, as at a dead centre.
 VectorXd JointSystem::hold(std::span<JointedBody> bodies, const Rows& all, double kick, double drift) {
   const std::vector<JointedBody> start(bodies.begin(), bodies.end());
   VectorXd given = VectorXd::Zero(static_cast<Index>(all.row.size()));
@@ -344,17 +360,25 @@ VectorXd JointSystem::hold(std::span<JointedBody> bodies, const Rows& all, doubl
     std::copy(start.begin(), start.end(), bodies.begin());
     push(bodies, all, given);
     VectorXd impulses = given;
-    find(bodies, all, open, drift, impulses);
+    std::exception_ptr unheld;
+    try {
+      find(bodies, all, open, drift, impulses);
+    } catch (const DivergedError&) {
+      unheld = std::current_exception();
+    }
     const std::size_t rows_open = open.size();
     std::erase_if(open, [&](Index i) {
       const Rows::Row& row = all.row[static_cast<std::size_t>(i)];
       if (!row.drives || !places_[row.place].joint.torque) return false;
       const double most = *places_[row.place].joint.torque * kick / size_;
-      if (!(std::abs(impulses[i]) > most)) return false;
-      given[i] = std::copysign(most, impulses[i]);
+      if (!unheld && !(std::abs(impulses[i]) > most)) return false;
+      const Place& place = places_[row.place];
+      given[i] = std::copysign(most, unheld ? missing_speed(place, row.turn[0] / size_, start) : impulses[i]);
       return true;
     });
-    if (open.size() == rows_open) return impulses;
+    if (open.size() < rows_open) continue;
+    if (unheld) std::rethrow_exception(unheld);
+    return impulses;
   }
 }
 

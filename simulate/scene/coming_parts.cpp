@@ -8,11 +8,29 @@
 namespace flexel::simulate {
 namespace {
 
-bool selects(const Selection& selection, const std::string& part) {
+// Leaves the part out of the selection. False: nothing else was selected.
+bool leave_out(Selection& selection, const std::string& part) {
   if (selection.kind == Selection::Kind::name)
-    return selection.name == part || selection.name.starts_with(part + "/");
-  return std::any_of(selection.members.begin(), selection.members.end(),
-                     [&](const Selection& each) { return selects(each, part); });
+    return selection.name != part && !selection.name.starts_with(part + "/");
+  std::vector<Selection> kept;
+  for (Selection& each : selection.members)
+    if (leave_out(each, part)) kept.push_back(std::move(each));
+  selection.members = std::move(kept);
+  if (selection.kind == Selection::Kind::complement && selection.members.empty()) {
+    constexpr double kFar = 1e30;  // m: a box of all elements, as they are all but those to come
+    selection.kind = Selection::Kind::box;
+    selection.min = Vec3::Constant(-kFar);
+    selection.max = Vec3::Constant(kFar);
+  }
+  return selection.kind != Selection::Kind::any_of || !selection.members.empty();
+}
+
+template <class Entry>
+void leave_out_of(std::vector<Entry>& entries, const std::string& part) {
+  std::vector<Entry> kept;
+  for (Entry& each : entries)
+    if (leave_out(each.where, part)) kept.push_back(std::move(each));
+  entries = std::move(kept);
 }
 
 }  // namespace
@@ -22,9 +40,8 @@ EffectParameters without_coming_parts(const Scene& scene, const Body& body) {
   const std::vector<std::string> here = part_names(body);
   for (const std::string& part : scene.coming_parts) {
     if (std::find(here.begin(), here.end(), part) != here.end()) continue;
-    const auto selects_it = [&](const auto& each) { return selects(each.where, part); };
-    std::erase_if(parameters.get<Loads>().loads, selects_it);
-    std::erase_if(parameters.get<Supports>().ties, selects_it);
+    leave_out_of(parameters.get<Loads>().loads, part);
+    leave_out_of(parameters.get<Supports>().ties, part);
   }
   return parameters;
 }

@@ -4,8 +4,8 @@
 
 namespace flexel::simulate {
 
-// What the scene says of effects, without the loads and supports that select parts which are to come and that the body
-// does not have yet.
+// What the scene says of effects, its loads and supports without the parts which are to come and that the body does not
+// have yet: what else they select stays, and without that they are left out.
 [[nodiscard]] EffectParameters without_coming_parts(const Scene& scene, const Body& body);
 // The scene as it is for the body that it begins with; its events read what they need.
 [[nodiscard]] Scene at_the_beginning(const Scene& scene, const Body& body);

@@ -350,6 +350,32 @@ TEST(Events, PartsThatComeCanBeSelectedByTheScene) {
       InputError);
 }
 
+// What a selection names beside a part that comes is held from the beginning.
+TEST(Events, SelectionsWithPartsThatComeHoldTheRestBefore) {
+  const flexel::test::Scratch scratch;
+  BoxOptions options;
+  options.cells = {2, 2, 2};
+  options.spacing = Vec3::Constant(1e-2);
+  options.name = "late";
+  options.origin = Vec3(0.4, 0, 0);
+  write_body(box_body(options), scratch.path("late.vtu"));
+  for (const char* where : {"[\"bar\", \"late\"]", "{ not = \"late\" }"}) {
+    const std::string text =
+        "[run]\ntime = \"4 ms\"\n[gravity]\nacceleration = [0, 0, \"-1 m/s2\"]\n[[fix]]\nwhere = " +
+        std::string(where) + "\n" +
+        event("2 ms", "do = \"add\"\nbody = \"" + scratch.path("late.vtu") + "\"");
+    const TimedCase made = run_timed(bar_of_cells(), gum_scene_with(text));
+    ASSERT_EQ(made.body.parts.size(), 2u);
+    std::size_t before = 0;
+    for (std::size_t i = 0; i < made.history.column("time").size(); ++i) {
+      if (made.history.column("time")[i] >= 2e-3) continue;
+      ++before;
+      EXPECT_EQ(made.history.column("kinetic")[i], 0) << where;
+    }
+    EXPECT_GT(before, 1u);
+  }
+}
+
 TEST(Events, WrongEntriesAreRefused) {
   const auto message = [](const std::string& text) -> std::string {
     try {

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -54,6 +55,16 @@ Joint joint_of(JointKind kind, const std::string& first, const std::string& seco
 
 void join(Scene& scene, Joint joint) {
   scene.get<Joints>().joints.push_back(std::move(joint));
+}
+
+Scene joined(const std::string& rest,
+             const std::string& more = "[parts.bar]\nrigid = true\n[run]\ntime = \"10 ms\"\n",
+             const std::string& head = "") {
+  return parse_scene(head +
+                         "material = \"gum\"\n[materials.gum]\nyoung = \"1 MPa\"\npoisson = 0.3\ndensity = "
+                         "\"1000 kg/m3\"\n" +
+                         more + rest,
+                     "scene.toml");
 }
 
 // Where the point of a part that rested at `rest` is: rigid parts move as four of their elements do.
@@ -269,6 +280,44 @@ TEST(Joints, AClosedLoopOfFourBarsWorks) {
   EXPECT_LT((place_now(made.body, 1, corner) - place_now(made.body, 2, corner)).norm(), 1e-9);
 }
 
+// A crank, a rod and a piston, whose pin drives the rod: it turns against the piston by no more than asin(4 / 14), and the
+// motor pushes there with what it has.
+TEST(Joints, AMotorStallsWhereTheJointsDoNotLetItTurn) {
+  const double couple = 1e-2;
+  Body body = block("crank", {6, 2, 2});
+  append(body, block("rod", {16, 2, 2}, Vec3(4 * kSide, 3 * kSide, 0)));
+  append(body, block("piston", {2, 2, 2}, Vec3(18 * kSide, 0, 0)));
+  Scene scene = mechanism({"crank", "rod", "piston"}, 0.4);
+  const Vec3 pivot(kSide, kSide, kSide), crank_pin(5 * kSide, kSide, kSide), pin(19 * kSide, kSide, kSide);
+  join(scene, joint_of(JointKind::hinge, "crank", "", pivot, Vec3::UnitY()));
+  join(scene, joint_of(JointKind::hinge, "crank", "rod", crank_pin, Vec3::UnitY()));
+  Joint motor = joint_of(JointKind::motor, "rod", "piston", pin, Vec3::UnitY());
+  motor.speed = 3;
+  motor.torque = couple;
+  join(scene, motor);
+  join(scene, joint_of(JointKind::slider, "piston", "", pin, Vec3::UnitX()));
+  const TimedCase made = testing::run_timed(std::move(body), scene);
+  const std::vector<double>&angle = made.history.column("rod piston angle"),
+        &drive = made.history.column("rod piston drive");
+  const double farthest = std::asin(4.0 / 14);
+  EXPECT_NEAR(*std::max_element(angle.begin(), angle.end()), farthest, 1e-3 * farthest);
+  EXPECT_NEAR(*std::max_element(drive.begin(), drive.end()), couple, 1e-9 * couple);
+  expect_books_close(made.result);
+}
+
+// An event, which makes the joints anew, forgets no whole turns.
+TEST(Joints, WholeTurnsAreCountedAcrossEvents) {
+  const auto turned = [](const std::string& more) {
+    const std::string text =
+        "[parts.bar]\nrigid = true\n[run]\ntime = \"20 ms\"\n[[joint]]\nkind = \"motor\"\nparts = "
+        "[\"bar\"]\nat = [0, 0, 0]\naxis = [0, 0, 1]\nangle_per_second = \"1000 rad\"\n";
+    return testing::run_timed(block("bar", {4, 2, 2}), joined(text, more)).history.column("bar angle").back();
+  };
+  const double event = turned("[[event]]\nat = \"15 ms\"\ndo = \"edit\"\nstiffness = 2\n");
+  EXPECT_NEAR(turned(""), 20, 0.1);
+  EXPECT_NEAR(event, turned(""), 0.1);
+}
+
 // A pendulum on a tool that is led: what leads it does the work, and feels the pull.
 TEST(Joints, ALedToolCarriesAPendulum) {
   Body body = block("tool", {2, 2, 2}, Vec3(0, 0, 11 * kSide));
@@ -305,16 +354,6 @@ TEST(Joints, AJointedPartLiesOnWhatItFallsOn) {
   EXPECT_NEAR(made.history.column("bar angle").back(), angle, 0.01);
   EXPECT_LT((place_now(made.body, 0, kEnd) - kEnd).norm(), 1e-11);
   EXPECT_LT(book(made.result, "worst_residual"), 0.01 * book(made.result, "largest_term"));
-}
-
-Scene joined(const std::string& rest,
-             const std::string& more = "[parts.bar]\nrigid = true\n[run]\ntime = \"10 ms\"\n",
-             const std::string& head = "") {
-  return parse_scene(head +
-                         "material = \"gum\"\n[materials.gum]\nyoung = \"1 MPa\"\npoisson = 0.3\ndensity = "
-                         "\"1000 kg/m3\"\n" +
-                         more + rest,
-                     "scene.toml");
 }
 
 std::string joint_refusal(const std::string& rest) {
