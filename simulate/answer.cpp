@@ -183,11 +183,13 @@ bool stress_settles(const SimulateResult& result) {
   return result.error_bars.von_mises && result.error_bars.von_mises->bar;
 }
 
-// What is said of the largest stress where smaller cells would not confirm it.
+// What is said of the largest stress where smaller cells would not confirm it, or were asked for in vain.
 std::string unsure(const SimulateResult& result) {
-  if (stress_settles(result)) return "";
+  const std::string not_closer =
+      result.no_local_stress.empty() ? "" : "; not looked at closer: " + result.no_local_stress;
+  if (stress_settles(result)) return not_closer;
   const std::string& beside = result.stress->beside;
-  if (beside.empty()) return "; smaller cells may show more";
+  if (beside.empty()) return "; smaller cells may show more" + not_closer;
   std::string text = fmt::format("; smaller cells show more beside {}", beside);
   if (result.local_stress && result.local_stress->stress.beside.empty()) {
     const LocalStress& local = *result.local_stress;
@@ -197,7 +199,7 @@ std::string unsure(const SimulateResult& result) {
                                   : "about " + human_pressure(local.stress.value),
                         place_in_one_unit(local.stress.at));
   }
-  return text;
+  return text + not_closer;
 }
 
 std::string peak_stress(const SimulateResult& result, double stress) {

@@ -238,6 +238,7 @@ struct LookedPlace {
   LargestStress largest;
   SymmetricStress stress = SymmetricStress::Zero();
   std::vector<double> values;  // Pa, the whole's first
+  double doubt_of_whole = 0;   // Pa
   bool grows_on = false;       // the values do not come to a limit
   double spacing = 0;          // m, of the finest cells
   std::string beside;          // of singular_beside()
@@ -257,7 +258,7 @@ Sequence sequence_of(const std::vector<double>& values) {
 
 // Where somebody may look: Pa, what the whole's cells say there and what it may be.
 struct Candidate {
-  double value = 0, may_be = 0;
+  double value = 0, may_be = 0, doubt = 0;
   Vec3 at = Vec3::Zero();
 };
 
@@ -418,25 +419,23 @@ class CloserLook {
   [[nodiscard]] static double bar_of(const LookedPlace& place) {
     return std::max(place.bar ? place.bar->half_width : 0, kLeastBar * place.largest.value);
   }
-  // What the largest stress may be where nobody looked closer; nothing: no more than the bar of what was found says. What the run's own cells had too large at
-  // the first place they have too large elsewhere.
+  // What the largest stress may be where nobody looked closer; nothing: no more than the bar of what was found says.
   // `in_vain`: where it could not be looked too.
   [[nodiscard]] std::optional<Candidate> most_elsewhere(bool in_vain) const {
     std::vector<Candidate> above;
     const double found = best().largest.value + bar_of(best());
-    const auto add = [&](double value, double may_be, const Vec3& at) {
+    const auto add = [&](double value, double may_be, double doubt, const Vec3& at) {
       if (may_be > found && !was_seen(at) && (in_vain || !was_given_up(at)))
-        above.push_back({value, may_be, at});
+        above.push_back({value, may_be, doubt, at});
     };
-    const double share = std::min(1.0, places_.front().largest.value / places_.front().values.front());
     for (std::size_t e = 0; e < merged_.element.size(); ++e) {
-      const double value = von_mises(merged_.element[e]);
-      add(value, share * value + kDoubts * merged_.element_doubt[e], merged_.element_at[e]);
+      const double value = von_mises(merged_.element[e]), doubt = merged_.element_doubt[e];
+      add(value, sure_share(value, doubt) * value + kDoubts * doubt, doubt, merged_.element_at[e]);
     }
     for (const SmallNotch& each : notches_)
       for (std::size_t i = 0; i < 2; ++i) {
         const double value = von_mises(merged_.vertex[each.edge.vertices[i]]);
-        add(value, concentration(each.radius, spacing()) * value, each.edge.ends[i]);
+        add(value, concentration(each.radius, spacing()) * value, 0, each.edge.ends[i]);
       }
     std::sort(above.begin(), above.end(),
               [](const Candidate& a, const Candidate& b) { return a.may_be > b.may_be; });
@@ -445,6 +444,14 @@ class CloserLook {
       if (!is_singular(each.at)) return each;
     }
     return std::nullopt;
+  }
+  // Of a stress of the run's own cells: without what they have too large. A place that is less in doubt than the first one was counts less too
+  // large: a field that the run's cells hold, as along an even bar, is as it is.
+  [[nodiscard]] double sure_share(double value, double doubt) const {
+    const LookedPlace& first = places_.front();
+    const double whole = first.values.front(), too_large = 1 - std::min(1.0, first.largest.value / whole);
+    if (!(value > 0 && first.doubt_of_whole > 0)) return 1;
+    return 1 - too_large * std::min(1.0, doubt / value * (whole / first.doubt_of_whole));
   }
   [[nodiscard]] bool is_singular(const Vec3& at) const {
     const double reach = kBesideInField * spacing();
@@ -481,7 +488,7 @@ class CloserLook {
     const std::optional<LargestStress> most = largest_stress(body(), merged_);
     if (!most || !(most->value > 0)) return std::nullopt;
     if (is_singular(most->at)) return largest_beyond();
-    return Candidate{most->value, most->value, most->at};
+    return Candidate{most->value, most->value, most->doubt, most->at};
   }
   // Where the largest stress has no limit, the largest away from there.
   std::optional<Candidate> largest_beyond() {
@@ -492,7 +499,8 @@ class CloserLook {
     std::sort(falling.begin(), falling.end());
     for (const auto& [value, e] : falling) {
       check_stop();
-      if (!is_singular(merged_.element_at[e])) return Candidate{-value, -value, merged_.element_at[e]};
+      if (!is_singular(merged_.element_at[e]))
+        return Candidate{-value, -value, merged_.element_doubt[e], merged_.element_at[e]};
     }
     return std::nullopt;
   }
@@ -502,6 +510,7 @@ class CloserLook {
   LookedPlace look(const Candidate& from) {
     LookedPlace place;
     place.values.push_back(from.value);
+    place.doubt_of_whole = from.doubt;
     place.largest = {from.value, from.at, 0, 0};
     const double radius = notch_radius(from.at);
     const bool turns = !solution_.turn.empty();

@@ -139,10 +139,11 @@ def test_a_closer_look_at_a_hole():
 
 def test_a_closer_look_beside_a_clamp_finds_no_limit():
     part = write("bar.stl", ascii_stl(box_triangles((60, 10, 10))))
-    summary, _ = look_closer(part, "4 mm", MATERIAL + '[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = [0, 0, "-10 N"]\n')
+    summary, done = look_closer(part, "4 mm", MATERIAL + '[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = [0, 0, "-10 N"]\n')
     expect(summary["largest_von_mises_beside"] == "a support", summary)
     expect(summary["error_bars"]["largest_von_mises"]["bar"] is None, summary["error_bars"])
     expect(summary["largest_von_mises_local_none"] == "it lies beside a support, and farther away none comes to a limit", summary)
+    expect("not looked at closer: it lies beside a support" in done.out.decode() + done.err, done)
 
 
 def test_a_closer_look_at_the_edge_of_a_punch_finds_no_limit():
