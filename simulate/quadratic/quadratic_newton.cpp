@@ -67,7 +67,7 @@ class LargeDeflection {
     if (settings.load_steps == 1) refuse_out_of_proportion(scene);
     double done = load_in_steps(settings, linear, linear_links);
     // past buckling true stresses and looser solutions sometimes arrive where the others do not
-    if (done < 1 && !weak_support_ && reach_ <= extent_ && !settings.newton_iterations) {
+    if (done < 1 && !weak_support_ && !settings.newton_iterations) {
       foretells_ = false;
       done = std::max(done, load_in_steps(settings, linear, linear_links));
     }
