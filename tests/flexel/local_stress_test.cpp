@@ -79,6 +79,20 @@ Mesh plate_with_hole(double radius, double side, double thickness, std::uint32_t
   return voxelize::shapes::prism(outline, caps, 0, thickness);
 }
 
+// The prism from z = 0 to `thickness` between two curves of as many points, m.
+Mesh prism_between(const std::vector<std::array<double, 2>>& lower,
+                   const std::vector<std::array<double, 2>>& upper, double thickness) {
+  std::vector<std::array<double, 2>> outline = lower;
+  outline.insert(outline.end(), upper.rbegin(), upper.rend());
+  std::vector<std::array<std::uint32_t, 3>> caps;
+  const auto last = static_cast<std::uint32_t>(outline.size()) - 1;
+  for (std::uint32_t k = 0; k + 1 < lower.size(); ++k) {
+    caps.push_back({k, k + 1, last - k - 1});
+    caps.push_back({k, last - k - 1, last - k});
+  }
+  return voxelize::shapes::prism(outline, caps, 0, thickness);
+}
+
 // Half of a bar along x, 0.16 x 0.03 m, whose upper side has round notches: x of the middle, radius and depth of each; m.
 Mesh notched_bar(const std::vector<Vec3>& notches, double thickness) {
   constexpr double kLength = 0.16, kHeight = 0.03;
@@ -93,16 +107,9 @@ Mesh notched_bar(const std::vector<Vec3>& notches, double thickness) {
     }
   }
   upper.push_back({kLength, kHeight});
-  std::vector<std::array<double, 2>> outline;
-  for (const auto& each : upper) outline.push_back({each[0], 0});
-  outline.insert(outline.end(), upper.rbegin(), upper.rend());
-  std::vector<std::array<std::uint32_t, 3>> caps;
-  const auto last = static_cast<std::uint32_t>(outline.size()) - 1;
-  for (std::uint32_t k = 0; k + 1 < upper.size(); ++k) {
-    caps.push_back({k, k + 1, last - k - 1});
-    caps.push_back({k, last - k - 1, last - k});
-  }
-  return voxelize::shapes::prism(outline, caps, 0, thickness);
+  std::vector<std::array<double, 2>> lower;
+  for (const auto& each : upper) lower.push_back({each[0], 0});
+  return prism_between(lower, upper, thickness);
 }
 
 // A quarter of a strip along x, 0.4 m long, 0.08 m wide, with an elliptic hole (24 mm across, 20 mm along) in its middle, that wide arcs of
@@ -125,15 +132,7 @@ Mesh narrowed_strip(double width) {
   }
   lower.push_back({kLength, 0});
   upper.push_back({kLength, width});
-  std::vector<std::array<double, 2>> outline = lower;
-  outline.insert(outline.end(), upper.rbegin(), upper.rend());
-  std::vector<std::array<std::uint32_t, 3>> caps;
-  const auto last = static_cast<std::uint32_t>(outline.size()) - 1;
-  for (std::uint32_t k = 0; k + 1 < lower.size(); ++k) {
-    caps.push_back({k, k + 1, last - k - 1});
-    caps.push_back({k, last - k - 1, last - k});
-  }
-  return voxelize::shapes::prism(outline, caps, 0, 0.0044);
+  return prism_between(lower, upper, 0.0044);
 }
 
 // The largest of what travels with the body is the summary's.

@@ -45,6 +45,17 @@ CentreOptions row_of(Index3 voxels) {
   return options;
 }
 
+// Two parts of so many elements, "right" by `apart` along x from "left"; m.
+Body two_parts(Index3 voxels, double apart) {
+  CentreOptions options = row_of(voxels);
+  options.name = "left";
+  Body body = centre_body(options);
+  options.name = "right";
+  options.origin = Vec3(apart, 0, 0);
+  append(body, centre_body(options));
+  return body;
+}
+
 Problem problem_of_paper(const Body& body, Rigidity rigidity = Rigidity::none) {
   Problem problem{body, {{"gum", kYoung, 0.25, kDensity, ""}}, {}, {Model::paper}, {HookeConstant::paper},
                   {}};
@@ -245,19 +256,8 @@ TEST(ConnectionYield, FusedBlocksAreOneInLaterRunsToo) {
   EXPECT_LT(later.position[last].x() - later.rest[last].x(), 0.1 * kWidth);
 }
 
-// Two elements of two parts, fused at 1.1 kWidth.
-Body two_parts() {
-  CentreOptions options = row_of({1, 1, 1});
-  options.name = "left";
-  Body body = centre_body(options);
-  options.name = "right";
-  options.origin = Vec3(1.1 * kWidth, 0, 0);
-  append(body, centre_body(options));
-  return body;
-}
-
 TEST(ConnectionYield, FusedConnectionsHaveTheMeansOfTheirElements) {
-  Body body = two_parts();
+  Body body = two_parts({1, 1, 1}, 1.1 * kWidth);
   const double length = 1.1 * kWidth, stiffness = 50;
   const std::vector<FusedPoint> points = {{{0, 1}, {1, -1}, stiffness, length}, {{0, 1}, {1, -1}, 3.0, 0.0}};
   KernelEffects plan;
@@ -306,12 +306,7 @@ TEST(ConnectionYield, FusedConnectionsHaveTheMeansOfTheirElements) {
 }
 
 TEST(ConnectionYield, FusedBlocksTearAndLoseEnergy) {
-  CentreOptions options = row_of({3, 2, 2});
-  options.name = "left";
-  Body body = centre_body(options);
-  options.name = "right";
-  options.origin = Vec3(3 * kWidth, 0, 0);
-  append(body, centre_body(options));
+  Body body = two_parts({3, 2, 2}, 3 * kWidth);
   std::vector<Vec3> velocity(body.element_count(), Vec3::Zero());
   for (std::uint32_t e = body.parts[1].element_begin; e < body.element_count(); ++e) velocity[e].x() = 12;
   set_velocity(body, velocity);
