@@ -3,10 +3,10 @@
 
 #include <chrono>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "base/error.h"
+#include "base/json.h"
 #include "base/nearest_word.h"
 #include "base/parallel.h"
 #include "base/printable.h"
@@ -107,7 +107,7 @@ std::string controls_of(const Clay& clay, const std::string& stem) {
   double spacing = 0;
   for (const Part& part : clay.body->parts) spacing = std::max(spacing, part.lattice.spacing.maxCoeff());
   json["spacing"] = spacing;
-  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return json_text(json);
 }
 
 }  // namespace

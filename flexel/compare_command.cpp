@@ -9,12 +9,12 @@
 #include <chrono>
 #include <filesystem>
 #include <limits>
-#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/files/files.h"
 #include "base/files/output_file.h"
 #include "base/human.h"
+#include "base/json.h"
 #include "base/parallel.h"
 #include "base/printable.h"
 #include "base/program/brief_output.h"
@@ -292,7 +292,7 @@ std::string comparison_json(const std::vector<Finding>& all) {
     order.push_back(all[stiffest[i]].file);
     if (i > 0) sure = sure && clearly_stiffer(all[stiffest[i - 1]], all[stiffest[i]]);
   }
-  return Json{{"parts", parts}, {"stiffest_first", order}, {"sure", sure}}.dump(2) + "\n";
+  return json_text({{"parts", parts}, {"stiffest_first", order}, {"sure", sure}}, 2) + "\n";
 }
 
 }  // namespace

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "base/files/output_file.h"
 #include "base/files/outputs.h"
 #include "base/human.h"
+#include "base/json.h"
 #include "base/math/area_vector.h"
 #include "base/parallel.h"
 #include "base/program/brief_output.h"
@@ -135,7 +135,7 @@ class Compensation {
     json["remaining_rms"] = check_.rms();
     json["remaining_at"] = {check_.at.x(), check_.at.y(), check_.at.z()};
     json["remaining_share"] = check_.largest / largest_;
-    return json.dump(2) + "\n";
+    return json_text(json, 2) + "\n";
   }
 
  private:

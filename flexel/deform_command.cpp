@@ -7,12 +7,12 @@
 #include <limits>
 #include <memory>
 #include <new>
-#include <nlohmann/json.hpp>
 
 #include "base/files/files.h"
 #include "base/files/output_file.h"
 #include "base/files/outputs.h"
 #include "base/human.h"
+#include "base/json.h"
 #include "base/parallel.h"
 #include "base/program/brief_output.h"
 #include "base/program/termination.h"
@@ -707,17 +707,16 @@ std::string summary_text(const SolvedRun& run, const mapping::MapReport& mapped,
                          const std::optional<FlexAnswer>& flexed,
                          const std::vector<mapping::CadAnswer>& cad) {
   nlohmann::ordered_json summary;
-  summary["voxelize"] = nlohmann::ordered_json::parse(voxelize::summary_json(run.voxels));
-  summary["simulate"] = nlohmann::ordered_json::parse(simulate::summary_json(run.simulated, run.voxels.body));
-  summary["map"] = nlohmann::ordered_json::parse(mapping::report_json(mapped, plan.map));
-  if (accuracy) summary["accuracy"] = nlohmann::ordered_json::parse(accuracy->json());
+  summary["voxelize"] = parse_json(voxelize::summary_json(run.voxels));
+  summary["simulate"] = parse_json(simulate::summary_json(run.simulated, run.voxels.body));
+  summary["map"] = parse_json(mapping::report_json(mapped, plan.map));
+  if (accuracy) summary["accuracy"] = parse_json(accuracy->json());
   if (flexed) {
     summary["flex"] = {{"angle", flexed->angle}, {"angle_asked", plan.job.flex->angle}};
     if (flexed->volume_change) summary["flex"]["volume_change"] = *flexed->volume_change;
   }
-  for (const mapping::CadAnswer& each : cad)
-    summary["cad"].push_back(nlohmann::ordered_json::parse(each.json));
-  return summary.dump(2) + "\n";
+  for (const mapping::CadAnswer& each : cad) summary["cad"].push_back(parse_json(each.json));
+  return json_text(summary, 2) + "\n";
 }
 
 // What is said at the end. `infill`: estimates for infill too, where nobody has said them. The last one says what to do

@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
-#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "base/error.h"
@@ -13,6 +12,7 @@
 #include "base/files/output_file.h"
 #include "base/human.h"
 #include "base/instruction_set.h"
+#include "base/json.h"
 #include "base/parallel.h"
 #include "base/program/arguments.h"
 #include "base/program/own_program.h"
@@ -137,7 +137,7 @@ std::string as_json(const std::vector<Tool>& found, const SelfTest& test) {
         {{"name", tool.name}, {"own", tool.own}, {"needed", tool.needed}, {"found", tool.found}});
   json["self_test"] = {
       {"passed", test.passed()}, {"found", test.found}, {"known", test.known}, {"seconds", test.seconds}};
-  return json.dump(2) + "\n";
+  return json_text(json, 2) + "\n";
 }
 
 }  // namespace

@@ -2,11 +2,11 @@
 #include <fmt/format.h>
 
 #include <limits>
-#include <nlohmann/json.hpp>
 
 #include "base/files/files.h"
 #include "base/files/output_file.h"
 #include "base/files/outputs.h"
+#include "base/json.h"
 #include "base/nearest_word.h"
 #include "base/parallel.h"
 #include "base/program/progress_stretch.h"
@@ -185,7 +185,7 @@ std::string summary(const mesh_export::Analysis& analysis, const ExportArguments
   json["why_nlgeom"] = analysis.why_deflection;
   json["notes"] = mesh.notes;
   json["warnings"] = analysis.warnings;
-  return json.dump(2) + "\n";
+  return json_text(json, 2) + "\n";
 }
 
 void report(const mesh_export::Analysis& analysis, Progress& progress) {

@@ -3,13 +3,13 @@
 
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <unordered_map>
 
 #include "base/error.h"
 #include "base/files/output_file.h"
 #include "base/files/outputs.h"
 #include "base/human.h"
+#include "base/json.h"
 #include "base/printable.h"
 #include "base/program/arguments.h"
 #include "base/program/brief_output.h"
@@ -283,7 +283,7 @@ std::string info_json(const Surface& surface, const Known& known) {
     }
     files.push_back(file);
   }
-  return Json{{"files", files}}.dump(2) + "\n";
+  return json_text({{"files", files}}, 2) + "\n";
 }
 
 // What a scene can name, a line each.

@@ -1,12 +1,12 @@
 // flexel measure: the effective elastic constants of a lattice beside those of its material.
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "base/error.h"
 #include "base/files/files.h"
 #include "base/files/output_file.h"
+#include "base/json.h"
 #include "base/nearest_word.h"
 #include "base/program/arguments.h"
 #include "base/program/termination.h"
@@ -138,7 +138,7 @@ std::string json_of(const MeasureArguments& arguments, const Measured& found) {
     json["bars"].back().update(bar(each));
   }
   if (found.limit) json["limit"] = bar(*found.limit);
-  return json.dump(2) + "\n";
+  return json_text(json, 2) + "\n";
 }
 
 }  // namespace

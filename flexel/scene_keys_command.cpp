@@ -2,11 +2,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/files/files.h"
 #include "base/files/output_file.h"
+#include "base/json.h"
 #include "base/program/arguments.h"
 #include "flexel/commands.h"
 #include "simulate/scene/scene_keys.h"
@@ -76,7 +76,7 @@ std::string as_json() {
                       {"models", group.models},
                       {"keys", std::move(keys)}});
   }
-  return nlohmann::ordered_json{{"groups", std::move(groups)}}.dump(2) + "\n";
+  return json_text({{"groups", std::move(groups)}}, 2) + "\n";
 }
 
 }  // namespace

@@ -6,13 +6,12 @@
 #include <ctime>
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "base/error.h"
 #include "base/files/files.h"
 #include "base/files/output_file.h"
-#include "base/json_depth.h"
+#include "base/json.h"
 #include "base/nearest_word.h"
 #include "base/program/arguments.h"
 #include "base/program/progress.h"
@@ -94,8 +93,7 @@ void add_references(const std::string& text, const study::SceneFacts& facts,
   }
   const Bytes bytes = read_all(text);
   const std::string_view content(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  const auto json =
-      json_depth(content) > kDeepestJson ? nlohmann::json() : nlohmann::json::parse(content, nullptr, false);
+  const auto json = parse_json(content);
   if (!json.is_object() || !json.contains("probes") || !json.contains("largest_displacement") ||
       !json.contains("elastic_energy"))
     throw InputError(text, "this is no summary of flexel-simulate (--summary); or write NAME=VALUE");

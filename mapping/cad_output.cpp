@@ -6,11 +6,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/files/output_file.h"
 #include "base/human.h"
+#include "base/json.h"
 #include "base/parallel.h"
 #include "base/resources.h"
 #include "base/units.h"
@@ -150,8 +150,7 @@ std::string json_of(const CadWritten& written, const CadFile& file, const MapOut
                                  {"volume_after", written.volume}};
   for (const CadFace& face : written.missed)
     json["missed"].push_back({{"face", face.name}, {"deviation", face.deviation}});
-  return json.dump(-1, ' ', false,
-                   nlohmann::ordered_json::error_handler_t::replace);  // paths and names may not be UTF-8
+  return json_text(json);
 }
 
 ChildLimits limits_of(const Body& body) {

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/human.h"
+#include "base/json.h"
 #include "base/units.h"
 #include "base/version.h"
 #include "simulate/probes/report.h"
@@ -344,7 +344,7 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
   json["time"] = Json::array();
   for (const EffectShare& effect : result.shares)
     json["time"].push_back({{"name", effect.name}, {"why", effect.why}, {"seconds", effect.seconds}});
-  return json.dump(2) + "\n";
+  return json_text(json, 2) + "\n";
 }
 
 std::vector<std::string> summary_lines(const SimulateResult& result) {

@@ -1,6 +1,6 @@
 // The report as JSON.
-#include <nlohmann/json.hpp>
 
+#include "base/json.h"
 #include "voxelize/report.h"
 
 namespace flexel::voxelize {
@@ -61,7 +61,7 @@ std::string summary_json(const VoxelizeResult& result) {
     else
       gaps.push_back({{"parts", names}, {"width", pair.gap}});
   }
-  return Json{{"parts", parts}, {"overlaps", overlaps}, {"gaps", gaps}}.dump(2) + "\n";
+  return json_text({{"parts", parts}, {"overlaps", overlaps}, {"gaps", gaps}}, 2) + "\n";
 }
 
 }  // namespace flexel::voxelize

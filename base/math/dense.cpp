@@ -1,6 +1,7 @@
 // Eigen's own solvers, each once.
 #include "base/math/dense.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
@@ -46,6 +47,38 @@ Eigen::MatrixXd orthonormal_base(const Eigen::MatrixXd& columns) {
 
 Eigen::VectorXd solve_dense(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right) {
   return matrix.fullPivLu().solve(right);
+}
+
+Eigen::VectorXd solve_least_norm(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right) {
+  return matrix.completeOrthogonalDecomposition().solve(right);
+}
+
+Eigen::Vector3d solve_symmetric_3(const Eigen::Matrix3d& matrix, const Eigen::Vector3d& right) {
+  return matrix.ldlt().solve(right);
+}
+
+Eigen::Matrix<double, 3, 6> solve_symmetric_3(const Eigen::Matrix3d& matrix,
+                                              const Eigen::Matrix<double, 3, 6>& right) {
+  return matrix.ldlt().solve(right);
+}
+
+Mat6d inverse_6(const Mat6d& matrix) {
+  return matrix.inverse();
+}
+
+CholeskyFactor::CholeskyFactor(const Eigen::MatrixXd& matrix) {
+  const Eigen::LLT<Eigen::MatrixXd> factor(matrix);
+  lower_ = factor.matrixL();
+  positive_ = factor.info() == Eigen::Success;
+}
+
+Eigen::VectorXd CholeskyFactor::solve(const Eigen::VectorXd& right) const {
+  const auto lower = lower_.triangularView<Eigen::Lower>();
+  return lower.transpose().solve(lower.solve(right));
+}
+
+Eigen::MatrixXd CholeskyFactor::inverse_lower() const {
+  return lower_.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(lower_.rows(), lower_.cols()));
 }
 
 }  // namespace flexel

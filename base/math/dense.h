@@ -39,4 +39,30 @@ struct NearestRotation {
 // matrix x = right, by Gaussian elimination with full pivoting.
 [[nodiscard]] Eigen::VectorXd solve_dense(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right);
 
+// Of all x that come nearest to matrix x = right the shortest, by a complete orthogonal decomposition.
+[[nodiscard]] Eigen::VectorXd solve_least_norm(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right);
+
+// matrix x = right of a symmetric positive semidefinite matrix, by L D L^T with pivoting.
+[[nodiscard]] Eigen::Vector3d solve_symmetric_3(const Eigen::Matrix3d& matrix, const Eigen::Vector3d& right);
+[[nodiscard]] Eigen::Matrix<double, 3, 6> solve_symmetric_3(const Eigen::Matrix3d& matrix,
+                                                            const Eigen::Matrix<double, 3, 6>& right);
+
+[[nodiscard]] Mat6d inverse_6(const Mat6d& matrix);
+
+// L L^T of a symmetric matrix (Cholesky).
+class CholeskyFactor {
+ public:
+  explicit CholeskyFactor(const Eigen::MatrixXd& matrix);
+
+  // Whether the matrix was positive definite; what follows asks that it was.
+  [[nodiscard]] bool positive() const { return positive_; }
+  [[nodiscard]] Eigen::VectorXd solve(const Eigen::VectorXd& right) const;
+  // L^-1
+  [[nodiscard]] Eigen::MatrixXd inverse_lower() const;
+
+ private:
+  Eigen::MatrixXd lower_;
+  bool positive_;
+};
+
 }  // namespace flexel

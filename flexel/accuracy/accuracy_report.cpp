@@ -1,9 +1,8 @@
 // The report of the resolution search, as text and JSON.
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
 #include "base/human.h"
+#include "base/json.h"
 #include "base/units.h"
 #include "flexel/accuracy/accuracy_report.h"
 
@@ -64,7 +63,7 @@ std::string AccuracyReport::json() const {
                             {"quantities", each.found},
                             {"failure", each.failure}});
   json["sentence"] = sentence();
-  return json.dump();
+  return json_text(json);
 }
 
 std::string size_text(double metres) {

@@ -7,10 +7,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/files/temporary_folder.h"
+#include "base/json.h"
 #include "base/printable.h"
 #include "base/program/own_program.h"
 #include "base/stop.h"
@@ -114,7 +114,7 @@ std::string header_of(const Body& body) {
                        {"elements", body.element_count()},
                        {"parts", parts},
                        {"tools", Json::array()}};
-  return header.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json_text(header) + "\n";
 }
 
 bool is_motion(const Act& act) {
@@ -489,7 +489,7 @@ std::string ClaySession::head(std::size_t bytes) const {
                {"said", printable(said_)}};
   if (stroke_.hand) json["hand"] = numbers(stroke_.hand->displacement, stroke_.hand->turn);
   json["bytes"] = bytes;
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json_text(json) + "\n";
 }
 
 void ClaySession::publish() {

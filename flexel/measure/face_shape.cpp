@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <bitset>
 #include <cmath>
@@ -17,6 +17,7 @@
 #include <span>
 
 #include "base/math/area_vector.h"
+#include "base/math/dense.h"
 
 namespace flexel::commands {
 namespace {
@@ -106,7 +107,7 @@ void fit_circle(const Surface& surface, const std::vector<std::uint32_t>& polygo
     normal_matrix += row * row.transpose();
     right += row * at.squaredNorm();
   });
-  const Vec3 solution = normal_matrix.ldlt().solve(right);
+  const Vec3 solution = solve_symmetric_3(normal_matrix, right);
   const Eigen::Vector2d centre = solution.head<2>() / 2;
   const double radius = std::sqrt(std::max(solution[2] + centre.squaredNorm(), 0.0));
   double deviation = 0;
@@ -154,7 +155,7 @@ bool tapers(const Surface& surface, const std::vector<std::uint32_t>& polygons, 
     right += row * further;
   });
   // corners at two places along the axis only leave its square open
-  const Vec3 fit = normal_matrix.completeOrthogonalDecomposition().solve(right);
+  const Vec3 fit = solve_least_norm(normal_matrix, right);
   return std::abs(fit[1]) + 2 * std::abs(fit[2]) > kRoundSine * half;
 }
 

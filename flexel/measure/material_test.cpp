@@ -1,9 +1,9 @@
 // The strains are 1e-6: small enough for the models' large deformation not to show.
 #include "flexel/measure/material_test.h"
 
-#include <Eigen/LU>
 #include <cmath>
 
+#include "base/math/dense.h"
 #include "simulate/models/cells.h"
 #include "simulate/models/central_spring.h"
 #include "simulate/models/connections.h"
@@ -231,7 +231,7 @@ std::vector<MeasuredDirection> measure_inside(simulate::Model model, simulate::H
     for (int b = 0; b < 6; ++b)
       stiffness(a, b) =
           energy(unit_strain(a) + unit_strain(b)) - energy(unit_strain(a)) - energy(unit_strain(b));
-  const Mat6 compliance = stiffness.inverse();
+  const Mat6 compliance = inverse_6(stiffness);
   std::vector<MeasuredDirection> result;
   for (const auto& [along, across] : {std::pair<Vec3, Vec3>{{1, 0, 0}, {0, 1, 0}},
                                       {{1, 1, 0}, {0, 0, 1}},

@@ -1,6 +1,7 @@
 // The loop: predict the open configurations, run the cheapest that fits the budget, write its row; then
 // repeat those whose time is not known to 5 %; then conclude.
 #include "flexel/study/session.h"
+#include "base/json.h"
 #include "flexel/study/tables.h"
 
 #include <fmt/format.h>
@@ -9,7 +10,6 @@
 #include <array>
 #include <cmath>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <set>
 
 #include "base/error.h"
@@ -144,7 +144,7 @@ Sweep Session::look() {
                                     : fmt::format("flexel-voxelize ended with exit code {}", run.exit_code));
   }
   std::ifstream in(summary);
-  const auto found = nlohmann::json::parse(in);
+  const auto found = read_json(in);
   double cells = 0, spacing = 0, volume = 0, together = 0, thinnest = 1e300;
   for (const auto& part : found["parts"]) {
     cells += part["cells"].get<double>();

@@ -1,8 +1,7 @@
 // study.csv, study.json and the table of predictions. docs/guide/study.md gives every column.
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
+#include "base/json.h"
 #include "base/units.h"
 #include "flexel/study/study.h"
 #include "flexel/study/tables.h"
@@ -168,7 +167,7 @@ std::string study_json(const Study& study) {
                                 {"predicted_memory", each.predicted.bytes},
                                 {"why", each.why}});
   json["notes"] = study.notes;
-  return json.dump(2) + "\n";
+  return json_text(json, 2) + "\n";
 }
 
 std::string prediction_table(const Study& study) {

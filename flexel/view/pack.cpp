@@ -6,7 +6,8 @@
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
+
+#include "base/json.h"
 
 namespace flexel::view {
 namespace {
@@ -73,7 +74,7 @@ void ArrayPack::add(const std::string& name, const std::string& description, std
   const Bytes packed = compress(planes);
   arrays_ +=
       fmt::format(R"({}{}:{{{},"count":{},"width":{},"offset":{},"bytes":{}}})", arrays_.empty() ? "" : ",",
-                  nlohmann::json(name).dump(), description, count, width, data_.size(), packed.size());
+                  json_text(name), description, count, width, data_.size(), packed.size());
   data_.insert(data_.end(), packed.begin(), packed.end());
 }
 

@@ -6,10 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <nlohmann/json.hpp>
 
 #include "base/files/output_file.h"
-#include "base/json_depth.h"
+#include "base/json.h"
 #include "base/printable.h"
 #include "base/units.h"
 #include "base/version.h"
@@ -97,7 +96,7 @@ Bytes pack_file(const ViewFile& file) {
   for (const auto& [name, text] : file.facts) about["facts"].push_back({printable(name), printable(text)});
   if (file.surface) about["surface"] = pack_drawn(*file.surface, "surface", pack);
   if (file.lattice) about["lattice"] = pack_drawn(*file.lattice, "lattice", pack);
-  return pack.finish(about.dump(-1, ' ', false, Json::error_handler_t::replace));
+  return pack.finish(json_text(about));
 }
 
 // The largest absolute value of each attribute, by name.
@@ -155,7 +154,7 @@ void collect_warnings(const Json& value, Json& warnings) {
       continue;
     }
     for (const Json& each : inner) {
-      const Json text = each.is_string() ? printable(each.get<std::string>()) : each.dump();
+      const Json text = each.is_string() ? printable(each.get<std::string>()) : json_text(each);
       if (std::find(warnings.begin(), warnings.end(), text) == warnings.end()) warnings.push_back(text);
     }
   }
@@ -166,7 +165,7 @@ Json words_json(const RunWords& words) {
   for (const std::string& line : words.warnings) warnings.push_back(printable(line));
   for (const std::string& line : words.lines) lines.push_back(printable(line));
   if (!words.summary.empty()) {
-    if (json_depth(words.summary) <= kDeepestJson) summary = Json::parse(words.summary, nullptr, false);
+    summary = parse_json(words.summary);
     if (!summary.is_object()) throw InputError("--summary: is no summary (JSON) of a run");
     collect_warnings(summary, warnings);
   }
@@ -176,8 +175,7 @@ Json words_json(const RunWords& words) {
 // JSON within <script>: no "</script" and no "<!--".
 std::string within_script(const Json& json) {
   std::string out;
-  for (const char c : json.dump(-1, ' ', false, Json::error_handler_t::replace))
-    c == '<' ? out += "\\u003c" : out += c;
+  for (const char c : json_text(json)) c == '<' ? out += "\\u003c" : out += c;
   return out;
 }
 

@@ -9,7 +9,13 @@ std::optional<Eigen::Quaterniond> turn(const NormalChange& change) {
   const bool turned_back = change.rest.dot(change.deformed) < 0;
   const bool turns = turned_back || change.rest.cross(change.deformed).norm() > kNoTurn * size;
   if (!change.moved || !turns || !(size > 0)) return std::nullopt;
-  return Eigen::Quaterniond::FromTwoVectors(change.rest, change.deformed);
+  const Vec3 from = change.rest.normalized(), to = change.deformed.normalized();
+  const double cosine = from.dot(to);
+  if (cosine < -1 + 1e-12) return Eigen::Quaterniond(Eigen::AngleAxisd(M_PI, from.unitOrthogonal()));
+  // Its length apart, (cos, sin axis) of half the angle.
+  Eigen::Quaterniond turn(1 + cosine, 0, 0, 0);
+  turn.vec() = from.cross(to);
+  return turn.normalized();
 }
 
 std::vector<NormalChange> vertex_normal_changes(const DeformedSurface& deformed) {

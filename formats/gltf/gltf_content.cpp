@@ -12,7 +12,7 @@
 #include <cstring>
 
 #include "base/error.h"
-#include "base/json_depth.h"
+#include "base/json.h"
 
 namespace flexel {
 namespace {
@@ -237,7 +237,7 @@ bool looks_like_glb(std::span<const std::byte> bytes) {
 GltfJson parse_gltf_json(std::string_view text, const std::string& where) {
   if (json_depth(text) > kDeepestJson)
     damaged(where, fmt::format("its JSON is nested more than {} deep", kDeepestJson));
-  GltfJson json = GltfJson::parse(text, nullptr, false);
+  GltfJson json = parse_json(text);
   if (!json.is_object()) damaged(where, "its JSON does not parse");
   const auto asset = json.find("asset");
   const bool versioned = asset != json.end() && asset->is_object() && asset->contains("version") &&
@@ -277,7 +277,7 @@ Gltf parse_glb(std::span<const std::byte> bytes, const std::string& where) {
 }
 
 Bytes make_glb(const Gltf& gltf) {
-  std::string json = gltf.json.dump(-1, ' ', false, GltfJson::error_handler_t::replace);
+  std::string json = json_text(gltf.json);
   json.resize((json.size() + 3) / 4 * 4, ' ');
   const std::size_t padded = (gltf.binary.size() + 3) / 4 * 4;
   const std::size_t size = 12 + 8 + json.size() + (padded > 0 ? 8 + padded : 0);

@@ -15,6 +15,7 @@
 
 #include "base/error.h"
 #include "base/files/output_file.h"
+#include "base/json.h"
 #include "base/version.h"
 #include "formats/common/normal_change.h"
 #include "formats/common/surface_writers.h"
@@ -326,8 +327,7 @@ class GltfMaker {
       if (opacity < 1) json["alphaMode"] = "BLEND";
     }
     json["pbrMetallicRoughness"] = look;
-    const auto found =
-        materials_.emplace(json.dump(-1, ' ', false, GltfJson::error_handler_t::replace), materials_.size());
+    const auto found = materials_.emplace(json_text(json), materials_.size());
     if (found.second) gltf_.json["materials"].push_back(std::move(json));
     return found.first->second;
   }

@@ -2,10 +2,10 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/human.h"
+#include "base/json.h"
 #include "base/units.h"
 #include "base/version.h"
 #include "mapping/anchors/frame.h"
@@ -274,13 +274,13 @@ std::string cell_text(const Json& value) {
   if (value.is_null()) return "-";
   if (value.is_string()) return value.get<std::string>();
   if (value.is_number_float()) return fmt::format("{:.6g}", value.get<double>());
-  return value.dump();
+  return json_text(value);
 }
 
 }  // namespace
 
 std::string report_json(const MapReport& report, const MapOptions& options) {
-  return report_object(report, options).dump(2) + "\n";
+  return json_text(report_object(report, options), 2) + "\n";
 }
 
 std::string report_table(const MapReport& report, const MapOptions& options) {

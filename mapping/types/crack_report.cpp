@@ -5,9 +5,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/json.h"
 #include "base/nearest_word.h"
 #include "base/units.h"
 
@@ -85,7 +85,7 @@ std::string crack_json(const CrackReport& report) {
   json["fragments"] = report.fragments;
   json["cracked_parts"] = report.cracked_parts;
   json["spanning_triangles"] = report.spanning_triangles;
-  if (report.pieces.empty()) return json.dump();
+  if (report.pieces.empty()) return json_text(json);
   const bool volumes = report.mode == CrackMode::cap;
   nlohmann::ordered_json& pieces = json["pieces"] = nlohmann::ordered_json::array();
   for (const CrackPiece& piece : report.pieces) {
@@ -103,7 +103,7 @@ std::string crack_json(const CrackReport& report) {
   }
   json["dropped_pieces"] = report.dropped();
   if (volumes) json["dropped_volume"] = report.dropped_volume();
-  return json.dump();
+  return json_text(json);
 }
 
 }  // namespace flexel::mapping

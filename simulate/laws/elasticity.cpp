@@ -1,9 +1,10 @@
 // The laws but neo-Hooke's are written once, over a number type; here with double.
 #include "simulate/laws/elasticity.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Eigenvalues>
 #include <limits>
 
+#include "base/math/dense.h"
 #include "simulate/laws/mooney_rivlin.h"
 #include "simulate/laws/neo_hooke_scalar.h"
 #include "simulate/laws/orthotropic.h"
@@ -153,7 +154,7 @@ Law mooney_rivlin_law(double c10, double c01, double bulk) {
 Law orthotropic_law(const Mat6& compliance, const Mat3& axes) {
   Law law;
   law.name = LawName::orthotropic;
-  const Mat6 own = compliance.inverse(), moduli = turned(own, axes);
+  const Mat6 own = inverse_6(compliance), moduli = turned(own, axes);
   for (int i = 0; i < 6; ++i)
     for (int j = 0; j < 6; ++j) law.moduli[i][j] = moduli(i, j);
   // Voigt's averages (Hill 1952)

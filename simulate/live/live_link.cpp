@@ -10,10 +10,10 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/files/append_text.h"
+#include "base/json.h"
 #include "simulate/effects/rigid.h"
 
 namespace flexel::simulate {
@@ -140,7 +140,7 @@ std::string LiveLink::header() const {
     json["parts"].push_back({{"name", part.name}, {"begin", part.element_begin}, {"end", part.element_end}});
   json["tools"] = nlohmann::ordered_json::array();
   for (const auto& tool : tools_) json["tools"].push_back(tool->name);
-  return json.dump() + "\n";
+  return json_text(json) + "\n";
 }
 
 void LiveLink::write_frame(const State& state, bool late) {

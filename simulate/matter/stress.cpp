@@ -1,12 +1,12 @@
 // Cells first, then elements; both in parallel, each written by one thread in a fixed order.
 #include "simulate/matter/stress.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <span>
 
+#include "base/math/dense.h"
 #include "base/math/distance.h"
 #include "base/parallel.h"
 #include "formats/lattice/cell_moments.h"
@@ -205,7 +205,7 @@ class Recovery {
     Mat3 spread = moments.block<3, 3>(1, 1) - moments(0, 0) * middle * middle.transpose();
     spread.diagonal().array() += ridge;
     const Eigen::Matrix<double, 3, 6> slope =
-        spread.ldlt().solve(values.bottomRows<3>() - moments(0, 0) * middle * mean);
+        solve_symmetric_3(spread, values.bottomRows<3>() - moments(0, 0) * middle * mean);
     return (mean + (beside - middle).transpose() * slope).transpose();
   }
 

@@ -1,9 +1,11 @@
 // One cell. Everything is written in H = F - I, so that strains of 1e-12 still have ten digits.
 #include "simulate/models/cell_model.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <limits>
+
+#include "base/math/dense.h"
 
 namespace flexel::simulate {
 namespace {
@@ -34,7 +36,7 @@ void set_diagonal(CellKind& kind) {
 // c_m of a material with other moduli along each axis of the lattice: Young's without contraction, and the
 // shear moduli, both from the compliance along those axes.
 std::array<double, 4> hourglass_of(const Law& law, const Vec3& curvature, double volume) {
-  const Mat6 s = moduli_at_rest(law).inverse();
+  const Mat6 s = inverse_6(moduli_at_rest(law));
   Vec3 bend, twist_xyz, slide;  // E_j / (1 + nu), mean shear beside axis j; G of xy, yz, zx
   for (int k = 0; k < 3; ++k) slide[k] = 1 / s(3 + k, 3 + k);
   for (int j = 0; j < 3; ++j) {

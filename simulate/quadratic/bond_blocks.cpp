@@ -1,10 +1,10 @@
 // As the blocks of single cells: the inverse of Cholesky's factor of the scaled stiffness of the block's nodes.
 #include "simulate/quadratic/bond_blocks.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "base/math/dense.h"
 #include "base/parallel.h"
 
 namespace flexel::simulate {
@@ -124,13 +124,14 @@ void BondBlocks::factorise(Part& part, const Eigen::MatrixXd& sum) {
   const Eigen::VectorXd scale = sum.diagonal().cwiseAbs().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   Eigen::MatrixXd scaled = scale.asDiagonal() * sum * scale.asDiagonal();
   scaled.diagonal().array() += kRaisedBond;
-  Eigen::LLT<Eigen::MatrixXd> factor(scaled);
-  for (double more = 1e-4; factor.info() != Eigen::Success && more < 10; more *= 10) {
+  CholeskyFactor factor(scaled);
+  for (double more = 1e-4; !factor.positive() && more < 10; more *= 10) {
     scaled.diagonal().array() += more;
-    factor.compute(scaled);
+    factor = CholeskyFactor(scaled);
   }
-  Eigen::MatrixXd lower = Eigen::MatrixXd::Identity(size, size);
-  if (factor.info() == Eigen::Success) factor.matrixL().solveInPlace(lower);  // else by the diagonal alone
+  // else by the diagonal alone
+  const Eigen::MatrixXd lower =
+      factor.positive() ? factor.inverse_lower() : Eigen::MatrixXd(Eigen::MatrixXd::Identity(size, size));
   part.scale = scale.cast<float>();
   part.inverse_factor.reserve(static_cast<std::size_t>(size * (size + 1) / 2));
   for (Eigen::Index row = 0; row < size; ++row)

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -16,6 +15,7 @@
 #include "base/error.h"
 #include "base/human.h"
 #include "base/math/area_vector.h"
+#include "base/math/dense.h"
 #include "base/program/progress.h"
 #include "base/stop.h"
 #include "simulate/estimate/stress_singularity.h"
@@ -185,7 +185,7 @@ class Mixing {
         for (Eigen::Index b = 0; b < count; ++b)
           normal(a, b) = dot(changes_[static_cast<std::size_t>(a)], changes_[static_cast<std::size_t>(b)]);
       }
-      const Eigen::VectorXd share = normal.completeOrthogonalDecomposition().solve(right);
+      const Eigen::VectorXd share = solve_least_norm(normal, right);
       for (Eigen::Index a = 0; a < count; ++a)
         for (std::size_t i = 0; i < to.size(); ++i)
           to[i] -=

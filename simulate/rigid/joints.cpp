@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -268,7 +267,7 @@ void JointSystem::refuse_speeds(std::span<JointedBody> bodies) const {
     before += each.led ? 0 : kinetic(*each.body, each.momentum, each.spin);
   MatrixXd matrix = all.matrix;
   matrix.diagonal().array() += kHeldTwice * matrix.trace() / static_cast<double>(matrix.rows());
-  const VectorXd impulses = -Eigen::LLT<MatrixXd>(matrix).solve(speeds);
+  const VectorXd impulses = -CholeskyFactor(matrix).solve(speeds);
   push(bodies, all, impulses);  // of what is led nobody asks
   for (const JointedBody& each : bodies)
     after += each.led ? 0 : kinetic(*each.body, each.momentum, each.spin);
@@ -315,7 +314,7 @@ void JointSystem::find(std::span<JointedBody> bodies, const Rows& all, const std
                        double drift, VectorXd& impulses) const {
   MatrixXd matrix = drift * all.matrix(open, open);
   matrix.diagonal().array() += kHeldTwice * matrix.trace() / static_cast<double>(matrix.rows());
-  const Eigen::LLT<MatrixXd> factor(matrix);
+  const CholeskyFactor factor(matrix);
   double before = std::numeric_limits<double>::infinity();
   for (int round = 0; round < kJointRounds; ++round) {
     for (JointedBody& each : bodies)

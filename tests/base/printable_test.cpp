@@ -1,9 +1,8 @@
 // What text of files may do to a terminal: nothing.
 #include "base/printable.h"
+#include "base/json.h"
 
 #include <gtest/gtest.h>
-
-#include "base/json_depth.h"
 
 namespace flexel {
 namespace {

@@ -134,7 +134,8 @@ def test_a_press_fit_presses_as_a_pin_that_swells():
     swollen = pushes(3, SWOLLEN)
     for text in (at_once, let_out):
         # of 50 um a fifth is the soft part, and of what is left contact's own yielding takes a share
-        expect(.5 < pushes(3.05, text) / swollen < .85, f"{pushes(3.05, text)} N, swollen {swollen} N: {text}")
+        pressed = pushes(3.05, text)
+        expect(.5 < pressed / swollen < .85, f"{pressed} N, swollen {swollen} N: {text}")
         expect(abs(pushes(3, text)) < .01 * swollen, f"a pin that just fits presses nothing: {text}")
 
 

@@ -16,6 +16,7 @@
 #include "simulate/result/result.h"
 #include "simulate/scene/scene.h"
 #include "simulate/simulate.h"
+#include "tests/sanitized.h"
 #include "tests/simulate/box_body.h"
 
 namespace flexel::simulate {
@@ -143,7 +144,7 @@ struct LoadCase {
 // A turned bar under each kind of load, by far enough to bend it: loads and
 // reactions balance where it is.
 TEST(Loads, ReactionsBalanceForcesAndMoments) {
-  const LoadCase cases[] = {
+  const std::vector<LoadCase> all = {
       {"force", "force = [\"3 N\", \"-2 N\", \"5 N\"]"},
       {"pressure", "pressure = \"40 kPa\""},
       {"torque", "torque = [\"0.2 N m\", \"0 N m\", \"0.1 N m\"]"},
@@ -154,7 +155,7 @@ TEST(Loads, ReactionsBalanceForcesAndMoments) {
        "force = [\"1 N\", 0, 0]\nat = [0, \"30 mm\", "
        "0]\ntorque = [0, 0, \"0.1 N m\"]"},
   };
-  for (const LoadCase& each : cases) {
+  for (const LoadCase& each : less_if_sanitized(all, {all[1], all[4]}, "two loads of five")) {
     testing::BoxOptions options{.cells = {10, 3, 3}, .spacing = Vec3::Constant(0.005)};
     options.axes = Eigen::AngleAxisd(0.5, Vec3(1, 2, 0.5).normalized()).toRotationMatrix();
     Body body = testing::box_body(options);

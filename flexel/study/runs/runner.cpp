@@ -8,12 +8,12 @@
 #include <cmath>
 #include <fstream>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <regex>
 
 #include "base/error.h"
 #include "base/files/files.h"
 #include "base/files/output_file.h"
+#include "base/json.h"
 #include "base/program/own_program.h"
 #include "flexel/study/runs/history_csv.h"
 #include "flexel/study/runs/scene_edit.h"
@@ -23,7 +23,7 @@
 namespace flexel::study {
 namespace {
 
-using Json = nlohmann::json;
+using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
 struct Log {
@@ -45,7 +45,7 @@ Log read_log(const fs::path& path) {
 
 Json read_json(const fs::path& path) {
   std::ifstream in(path);
-  return Json::parse(in);
+  return flexel::read_json(in);
 }
 
 constexpr double kThinWall = 2;  // cells

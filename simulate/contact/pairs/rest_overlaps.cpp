@@ -2,9 +2,10 @@
 // whether all pairs there overlap by nearly that.
 #include "simulate/contact/pairs/rest_overlaps.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+
+#include "base/math/dense.h"
 
 namespace flexel::simulate {
 namespace {
@@ -90,7 +91,7 @@ WholeOverlap least_squares_overlap(const OverlapMoments& sums) {
   const Mat3 spread = mean.block<3, 3>(1, 1) - normal * normal.transpose();
   const Vec3 slope = mean.block<3, 1>(1, 4) - depth * normal;
   WholeOverlap whole;
-  whole.fit.offset = (spread + kRidge * Mat3::Identity()).ldlt().solve(slope);
+  whole.fit.offset = solve_symmetric_3(spread + kRidge * Mat3::Identity(), slope);
   whole.fit.depth = depth - whole.fit.offset.dot(normal);
   const double explained = whole.fit.offset.dot(spread * whole.fit.offset),
                left = mean(4, 4) - depth * depth - 2 * whole.fit.offset.dot(slope) + explained;

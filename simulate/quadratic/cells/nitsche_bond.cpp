@@ -1,11 +1,10 @@
 // Many points at a time, as for supports.
 #include "simulate/quadratic/cells/nitsche_bond.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
+#include "base/math/dense.h"
 #include "simulate/quadratic/cells/nitsche_support.h"
 
 namespace flexel::simulate {
@@ -59,12 +58,11 @@ double bearing_limit(const CellMatrix& stiffness, const std::array<Vec3, kQuadra
       rigid.block<3, 1>(at, axis) = Vec3::Unit(axis);
       rigid.block<3, 1>(at, 3 + axis) = Vec3::Unit(axis).cross(rest[n] - rest[13]) / lattice.spacing.mean();
     }
-  const Eigen::Matrix<double, kCellUnknowns, 6> orthonormal =
-      rigid.householderQr().householderQ() * Eigen::Matrix<double, kCellUnknowns, 6>::Identity();
+  const Eigen::Matrix<double, kCellUnknowns, 6> orthonormal = orthonormal_base(rigid);
   CellMatrix held = stiffness;
   held.noalias() += stiffness.trace() / kCellUnknowns * orthonormal * orthonormal.transpose();
   held.diagonal().array() += 1e-12 * stiffness.trace();
-  const Eigen::LLT<CellMatrix> factor(held);
+  const CholeskyFactor factor(held);
   CellMatrix pulled = CellMatrix::Zero();
   for (const FacePoint* point : points) {
     const NitschePoint at = traction_point(*point, lattice, moduli);
