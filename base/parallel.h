@@ -1,15 +1,9 @@
-// All use of oneTBB is here. Every function gives the same bits for any number of threads: the chunk size
+// Loops and sums on several threads. Every function gives the same bits for any number of threads: the chunk size
 // depends on n only, and reductions add the chunks' sums in order. Every chunk begins with check_stop()
 // (base/stop.h), so each function may throw Interrupted and TimeoutError.
+//
+// oneTBB is in parallel.cpp and parallel_sort.h alone: compiled into each loop it took a fifth of a second a loop.
 #pragma once
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/global_control.h>
-#include <oneapi/tbb/info.h>
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/parallel_invoke.h>
-#include <oneapi/tbb/parallel_sort.h>
-#include <oneapi/tbb/task_arena.h>
-
 #include <algorithm>
 #include <cstddef>
 #include <memory>
@@ -22,45 +16,57 @@ namespace flexel {
 // Limits the threads of everything below while it lives; 0 means every core.
 class ThreadLimit {
  public:
-  explicit ThreadLimit(int threads)
-      : control_(tbb::global_control::max_allowed_parallelism,
-                 threads > 0 ? static_cast<std::size_t>(threads)
-                             : static_cast<std::size_t>(tbb::info::default_concurrency())) {}
+  explicit ThreadLimit(int threads);
+  ~ThreadLimit();
+  ThreadLimit(const ThreadLimit&) = delete;
+  ThreadLimit& operator=(const ThreadLimit&) = delete;
 
  private:
-  tbb::global_control control_;
+  class Control;
+  std::unique_ptr<Control> control_;
 };
 
-[[nodiscard]] inline int default_thread_count() {
-  return tbb::info::default_concurrency();
-}
+[[nodiscard]] int default_thread_count();
 
 // Threads that the functions below use now, at least 1.
-[[nodiscard]] inline std::size_t thread_count() {
-  const std::size_t allowed = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
-  return std::max<std::size_t>(
-      1, std::min(allowed, static_cast<std::size_t>(tbb::this_task_arena::max_concurrency())));
-}
+[[nodiscard]] std::size_t thread_count();
+
+// A function of a chunk's number, not owned.
+class ChunkFunction {
+ public:
+  template <class Function>
+  explicit ChunkFunction(const Function& function)
+      : function_(&function),
+        call_([](const void* of, std::size_t chunk) { (*static_cast<const Function*>(of))(chunk); }) {}
+
+  void operator()(std::size_t chunk) const { call_(function_, chunk); }
+
+ private:
+  const void* function_;
+  void (*call_)(const void*, std::size_t);
+};
+
+// Calls it with 0 to chunks - 1; check_stop() goes before each.
+void run_chunks(std::size_t chunks, ChunkFunction function);
 
 // Both at the same time.
 template <class First, class Second>
 void parallel_both(const First& first, const Second& second) {
-  tbb::parallel_invoke(first, second);
+  const auto either = [&](std::size_t which) { which == 0 ? first() : second(); };
+  run_chunks(2, ChunkFunction(either));
 }
 
 // body(begin, end) over [0, n) in chunks of `grain`.
 template <class Body>
 void parallel_chunks(std::size_t n, std::size_t grain, const Body& body) {
   const std::size_t chunks = (n + grain - 1) / grain;
-  check_stop();
   if (chunks <= 1) {
+    check_stop();
     if (n > 0) body(std::size_t{0}, n);
     return;
   }
-  tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t c) {
-    check_stop();
-    body(c * grain, std::min(n, (c + 1) * grain));
-  });
+  const auto chunk = [&](std::size_t c) { body(c * grain, std::min(n, (c + 1) * grain)); };
+  run_chunks(chunks, ChunkFunction(chunk));
 }
 
 // body(i) for each i in [0, n).
@@ -76,22 +82,15 @@ template <class Value, class Term>
 [[nodiscard]] Value parallel_sum(std::size_t n, const Term& term, std::size_t grain = 4096) {
   const std::size_t chunks = (n + grain - 1) / grain;
   std::vector<Value> partial(chunks, Value{});
-  tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t c) {
-    check_stop();
+  const auto chunk = [&](std::size_t c) {
     Value sum{};
     for (std::size_t i = c * grain; i < std::min(n, (c + 1) * grain); ++i) sum += term(i);
     partial[c] = sum;
-  });
+  };
+  run_chunks(chunks, ChunkFunction(chunk));
   Value total{};
   for (const Value& value : partial) total += value;
   return total;
-}
-
-// Sorts by `less`, which must be a strict total order for repeatable results.
-template <class Iterator, class Less>
-void parallel_sort(Iterator begin, Iterator end, const Less& less) {
-  check_stop();
-  tbb::parallel_sort(begin, end, less);
 }
 
 }  // namespace flexel

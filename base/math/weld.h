@@ -12,6 +12,7 @@
 
 #include "base/bucket.h"
 #include "base/parallel.h"
+#include "base/parallel_sort.h"
 
 namespace flexel {
 

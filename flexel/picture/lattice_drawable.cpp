@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "base/parallel.h"
+#include "base/parallel_sort.h"
 
 namespace flexel::picture {
 namespace {

@@ -17,6 +17,7 @@
 #include "base/error.h"
 #include "base/math/weld.h"
 #include "base/parallel.h"
+#include "base/parallel_sort.h"
 #include "formats/common/readers.h"
 
 namespace flexel {

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "base/parallel.h"
+#include "base/parallel_sort.h"
 
 namespace flexel::simulate {
 namespace {

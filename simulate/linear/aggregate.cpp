@@ -11,6 +11,7 @@
 #include <numeric>
 
 #include "base/parallel.h"
+#include "base/parallel_sort.h"
 
 namespace flexel::simulate {
 namespace {

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/parallel_sort.h"
 
 namespace flexel {
 namespace {

@@ -81,7 +81,8 @@ def test_a_drag_is_the_move_of_flexel_deform():
         expect_silence(browser)
     expect_ok(run("flexel", "deform", "bracket.step", "--scene", "scene.toml", "--size", "4 mm", "-o", "deform.stl", "--summary", "summary.json", "--quiet"))
     data = pathlib.Path("deform.stl").read_bytes()
-    expect(farthest(stl, data) < 1e-3, f"the part is that of flexel deform within a micrometre: {farthest(stl, data)}")
+    apart = farthest(stl, data)
+    expect(apart < 1e-3, f"the part is that of flexel deform within a micrometre: {apart}")
     expect(abs(1e3 * box - min(c[2] for c in corners(data))) < 0.03, "what is drawn is that within 0.03 mm")
     force = json.loads(pathlib.Path("summary.json").read_text())["simulate"]["reactions"][-1]["force"]
     expect(max(abs(a + b) for a, b in zip(force, frame["felt"][-1])) < 1e-4 * max(map(abs, force)), f"and so is the force: {force} {frame['felt']}")

@@ -5,7 +5,7 @@
 #include <functional>
 #include <limits>
 
-#include "base/parallel.h"
+#include "base/parallel_sort.h"
 
 namespace flexel::simulate {
 namespace {
