@@ -3,6 +3,7 @@
 #include "flexel/clay/pulled_body.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "base/error.h"
 #include "base/parallel.h"

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "formats/part/near_weld.h"
 #include "formats/part/topology.h"

@@ -6,6 +6,8 @@
 // (ContactStepBound). Forces on elements are summed in the order of the pairs, so that the bits do not depend
 // on the number of threads. One object serves all the hooks of a run.
 #pragma once
+#include <utility>
+
 #include "simulate/contact/contact_friction.h"
 #include "simulate/contact/contact_step_bound.h"
 #include "simulate/contact/implicit_contact.h"

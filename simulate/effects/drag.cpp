@@ -7,8 +7,10 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <numbers>
+#include <tuple>
 
 #include "base/parallel.h"
 #include "simulate/matter/interface_points.h"

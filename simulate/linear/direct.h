@@ -1,6 +1,7 @@
 // Direct solution of small systems: the coarsest level, and matrices too small for a hierarchy.
 #pragma once
 #include <Eigen/SparseCore>
+#include <type_traits>
 #include <vector>
 
 #include "base/math/vec.h"

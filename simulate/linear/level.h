@@ -1,6 +1,7 @@
 // One level of the hierarchy: its matrix, its smoother and the way to the next coarser level.
 #pragma once
 #include <cmath>
+#include <type_traits>
 #include <vector>
 
 #include "simulate/linear/block_inverse.h"

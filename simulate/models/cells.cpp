@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
 #include "base/parallel.h"
 #include "simulate/models/prepared_cell.h"

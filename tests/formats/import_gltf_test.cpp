@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 
+#include <cstring>
 #include <set>
 
 #include "tests/formats/import_help.h"

@@ -1,3 +1,6 @@
+#include <cstring>
+#include <limits>
+
 #include <gmock/gmock.h>
 
 #include "base/parallel.h"

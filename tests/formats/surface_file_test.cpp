@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstring>
 #include <random>
+#include <tuple>
 
 #include "tests/formats/import_help.h"
 

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <numbers>
+#include <tuple>
 
 #include "formats/exchange/resolution.h"
 #include "formats/exchange/size_warning.h"

@@ -1,4 +1,6 @@
 // Mutated messages of hands to flexel clay: refused, or what they say is finite and within bounds.
+#include <cstdlib>
+
 #include "base/error.h"
 #include "flexel/clay/act.h"
 #include "flexel/clay/clay_document.h"

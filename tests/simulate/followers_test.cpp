@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 
 #include "base/error.h"
 #include "base/stop.h"

@@ -4,6 +4,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <fstream>
+#include <limits>
 #include <numeric>
 #include <sstream>
 

@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <functional>
+#include <tuple>
 
 #include "base/error.h"
 #include "simulate/effects/damping.h"

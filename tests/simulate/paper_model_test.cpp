@@ -7,6 +7,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <limits>
 #include <random>
 
 #include "base/error.h"

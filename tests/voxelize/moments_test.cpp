@@ -1,4 +1,7 @@
 // Moments of cut cells against integrals over polyhedra that were cut another way, tetrahedron by tetrahedron.
+#include <numeric>
+#include <utility>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,6 @@
 // The fills add up to the volume of the surface, whatever its place on the lattice.
+#include <numeric>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

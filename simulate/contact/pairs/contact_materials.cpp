@@ -2,6 +2,7 @@
 #include "simulate/contact/pairs/contact_materials.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "simulate/models/rest_shape.h"
 

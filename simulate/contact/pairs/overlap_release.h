@@ -4,6 +4,8 @@
 // along a cubic in the release time, counted from when the later of its parts joined. That changes the stored
 // energy of the contacts beside the work of their forces; the energy account enters it as work of "overlap".
 #pragma once
+#include <utility>
+
 #include "simulate/contact/pairs/pair_memory.h"
 #include "simulate/contact/pairs/settings.h"
 
