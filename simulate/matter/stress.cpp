@@ -204,8 +204,8 @@ class Recovery {
     const Eigen::Matrix<double, 1, 6> mean = values.row(0) / moments(0, 0);
     Mat3 spread = moments.block<3, 3>(1, 1) - moments(0, 0) * middle * middle.transpose();
     spread.diagonal().array() += ridge;
-    const Eigen::Matrix<double, 3, 6> slope =
-        solve_symmetric_3(spread, values.bottomRows<3>() - moments(0, 0) * middle * mean);
+    const Eigen::Matrix<double, 3, 6> about = values.bottomRows<3>() - moments(0, 0) * middle * mean;
+    const Eigen::Matrix<double, 3, 6> slope = solve_symmetric_3(spread, about);
     return (mean + (beside - middle).transpose() * slope).transpose();
   }
 
