@@ -28,7 +28,7 @@ nlohmann::ordered_json parse_json(std::string_view text) {
   return nlohmann::ordered_json::parse(text, nullptr, false);
 }
 
-nlohmann::ordered_json read_json(std::istream& in) {
+nlohmann::ordered_json load_json(std::istream& in) {
   return nlohmann::ordered_json::parse(in);
 }
 

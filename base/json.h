@@ -20,7 +20,7 @@ constexpr std::size_t kDeepestJson = 500;
 [[nodiscard]] nlohmann::ordered_json parse_json(std::string_view text);
 
 // The same of what a stream holds; throws nlohmann::ordered_json::exception where that is no JSON. For files of our own programs.
-[[nodiscard]] nlohmann::ordered_json read_json(std::istream& in);
+[[nodiscard]] nlohmann::ordered_json load_json(std::istream& in);
 
 // On one line, or with `indent` spaces a level. Bytes that are not UTF-8 become U+FFFD.
 [[nodiscard]] std::string json_text(const nlohmann::ordered_json& json, int indent = -1);

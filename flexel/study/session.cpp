@@ -144,7 +144,7 @@ Sweep Session::look() {
                                     : fmt::format("flexel-voxelize ended with exit code {}", run.exit_code));
   }
   std::ifstream in(summary);
-  const auto found = read_json(in);
+  const auto found = load_json(in);
   double cells = 0, spacing = 0, volume = 0, together = 0, thinnest = 1e300;
   for (const auto& part : found["parts"]) {
     cells += part["cells"].get<double>();

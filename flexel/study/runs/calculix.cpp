@@ -150,7 +150,7 @@ CalculixLook look_at_calculix(const Case& study, const RunOptions& options) {
     return look;
   }
   std::ifstream in(job.string() + ".json");
-  const Json summary = read_json(in);
+  const Json summary = load_json(in);
   look.large_deflection = summary["nlgeom"];
   look.why_deflection = summary["why_nlgeom"];
   look.warnings = summary["warnings"].get<std::vector<std::string>>();
@@ -189,7 +189,7 @@ RunResult run_calculix(const Case& study, double size, bool large_deflection, in
                                      large_deflection ? "on" : "off", "--threads", std::to_string(threads)})))
     return result;
   std::ifstream in(job.string() + ".json");
-  const Json summary = read_json(in);
+  const Json summary = load_json(in);
   result.cells = summary["elements"];
   result.elements = summary["nodes"];
   result.spacing = size;

@@ -45,7 +45,7 @@ Log read_log(const fs::path& path) {
 
 Json read_json(const fs::path& path) {
   std::ifstream in(path);
-  return flexel::read_json(in);
+  return load_json(in);
 }
 
 constexpr double kThinWall = 2;  // cells
