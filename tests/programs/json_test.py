@@ -98,6 +98,23 @@ def test_every_command_has_it_or_prints_nothing():
         expect(has == (name not in WITHOUT), f"flexel {name}: --json {has}")
 
 
+def test_every_command_prints_json_alone():
+    """A new command belongs into this table, or among those that have a test of their own above or below."""
+    box()
+    body("body.vtu")
+    elsewhere = {"study", "measure", "doctor"}
+    out = ["-o", "out.stl", "--force"]
+    commands = {"deform": ["box.stl", *PULL, *out], "flex": ["box.stl", "--bend", "10 deg", "--material", "steel", "--size", "5 mm", *out],
+                "compare": ["box.stl", "box.stl", *PULL], "compensate": ["box.stl", *PULL, *out],
+                "export": ["box.stl", *PULL, "--calculix", "-o", "out.inp"], "info": ["box.stl"], "materials": [], "scene-keys": [],
+                "voxelize": ["box.stl", "--size", "5 mm", "-o", "out.vtu"], "simulate": [scene(), "body.vtu", "-o", "out.vtu", "--force"],
+                "map": ["body.vtu", *out]}
+    listed = {line.split("\t")[1] for line in expect_ok(run("flexel", "--describe-arguments")).out.decode().splitlines()}
+    expect(listed - WITHOUT - elsewhere == set(commands), f"not in the table: {listed - WITHOUT - elsewhere ^ set(commands)}")
+    for name, arguments in commands.items():
+        expect(parsed(name, *arguments, "--json"), f"flexel {name}: nothing was found")
+
+
 def test_doctor():
     found = parsed("doctor", "--json")
     test = found["self_test"]
