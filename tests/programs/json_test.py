@@ -87,8 +87,8 @@ def test_scene_keys():
     expect_error(run("flexel", "scene-keys", "--json", "--words"), "flexel", "excludes")
 
 
-# What draws, serves or only lists where to click has nothing to print as JSON.
-WITHOUT = {"picture", "view", "clay"}
+# What draws, serves, only lists where to click, or makes a body of a body has nothing to print as JSON.
+WITHOUT = {"picture", "view", "clay", "coarsen"}
 
 
 def test_every_command_has_it_or_prints_nothing():
