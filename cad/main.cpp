@@ -14,6 +14,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/program/share_scope.h"
 #include "cad/deform/write_job.h"
 #include "cad/read/occt.h"
 #include "formats/cad/cad_job.h"
@@ -88,8 +89,16 @@ Bytes do_job(const CadJob& job, const TellShare& tell) {
     return answer<CadWritten>(job.write->threads,
                               [&](const Warn& warn) { return write_deformed(*job.write, warn, tell); });
   }
-  return answer<CadMesh>(job.read->threads,
-                         [&](const Warn& warn) { return mesh_of(read_shape(*job.read, warn), *job.read); });
+  return answer<CadMesh>(job.read->threads, [&](const Warn& warn) {
+    constexpr double kRead = .6;  // of the time
+    const ShareScope scope(tell);
+    const CadShape shape = [&] {
+      const ShareScope reading(0, kRead);
+      return read_shape(*job.read, warn);
+    }();
+    const ShareScope meshing(kRead, 1);
+    return mesh_of(shape, *job.read);
+  });
 }
 
 }  // namespace

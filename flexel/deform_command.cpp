@@ -15,6 +15,7 @@
 #include "base/json.h"
 #include "base/parallel.h"
 #include "base/program/brief_output.h"
+#include "base/program/progress_stretch.h"
 #include "base/program/termination.h"
 #include "base/resources.h"
 #include "base/stop.h"
@@ -601,16 +602,20 @@ SolvedRun with_closer_look(const DeformArguments& arguments, const Plan& plan, c
                            SolvedRun chosen, Progress& progress) {
   HeldWarnings told;  // by the run that was chosen
   progress.stage("largest stress");
-  Progress inner("flexel", Progress::Mode::quiet);
+  constexpr double kVoxelized = 0.1;  // of the time
   voxelize::VoxelizeOptions how = plan.job.voxelize;
   how.size = chosen.size;
   const simulate::ErrorBars bars = std::move(chosen.simulated.error_bars);
-  chosen.voxels = voxelize::voxelize(surface, how, inner);
+  {
+    ProgressStretch voxelizing(progress, 0, kVoxelized);
+    chosen.voxels = voxelize::voxelize(surface, how, voxelizing.inner());
+  }
   Job job = plan.job;
   add_actions(job, chosen.voxels.body);
   simulate::SimulateOptions asked = simulate_options(arguments, plan);
   asked.cut_box = cut_box(arguments, plan, chosen.voxels.body);
-  chosen.simulated = simulate::simulate(chosen.voxels.body, job.scene, asked, inner);
+  ProgressStretch solving(progress, kVoxelized, 1);
+  chosen.simulated = simulate::simulate(chosen.voxels.body, job.scene, asked, solving.inner());
   std::optional<simulate::StressBar> stress = chosen.simulated.error_bars.von_mises;
   chosen.simulated.error_bars = bars;
   chosen.simulated.error_bars.von_mises = std::move(stress);

@@ -1,6 +1,7 @@
 // flexel info: what a part is and what a scene can name in it.
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <unordered_map>
@@ -21,7 +22,7 @@
 #include "flexel/measure/coordinates.h"
 #include "flexel/measure/face_shape.h"
 #include "formats/common/file_formats.h"
-#include "formats/exchange/import.h"
+#include "formats/exchange/import_parts.h"
 #include "formats/exchange/size_warning.h"
 #include "formats/exchange/surface_file.h"
 #include "formats/part/topology.h"
@@ -289,8 +290,13 @@ std::string info_json(const Surface& surface, const Known& known) {
 
 // What a scene can name, a line each.
 std::string words_of(const Surface& surface) {
-  std::string text = "xmin\nxmax\nymin\nymax\nzmin\nzmax\n";
-  for (const SurfacePart& part : surface.parts) text += printable(part.name) + "\n";
+  constexpr std::array kSides = {"xmin", "xmax", "ymin", "ymax", "zmin", "zmax"};
+  std::string text;
+  for (const char* side : kSides) text += fmt::format("{}\n", side);
+  for (const SurfacePart& part : surface.parts) {
+    text += printable(part.name) + "\n";
+    for (const char* side : kSides) text += fmt::format("{}/{}\n", printable(part.name), side);
+  }
   std::vector<PartInfo> parts(surface.parts.size());
   for (std::size_t p = 0; p < parts.size(); ++p) parts[p].name = surface.parts[p].name;
   for (const SurfaceFace& face : surface.faces) ++parts[face.part].called[face.name];
@@ -356,8 +362,7 @@ int info_command(int argc, char** argv) {
   Progress progress("flexel", words ? Progress::Mode::quiet : Progress::Mode::automatic);
   progress.stage("import");
   options.warn = [&](const std::string& line) { progress.warn(line); };
-  Surface surface = import_surface(files.front(), options);
-  for (std::size_t f = 1; f < files.size(); ++f) append(surface, import_surface(files[f], options));
+  Surface surface = import_parts(files, options, progress);
   if (words) {
     print(words_of(surface));
     return kExitDone;

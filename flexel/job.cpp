@@ -9,6 +9,7 @@
 #include "base/stop.h"
 #include "base/units.h"
 #include "formats/common/file_formats.h"
+#include "formats/exchange/import_parts.h"
 #include "formats/exchange/size_warning.h"
 #include "simulate/quadratic/quadratic_run.h"
 
@@ -84,8 +85,7 @@ void plan_after_files(const JobArguments& arguments, const std::function<void()>
 Surface read_parts(const std::vector<std::string>& paths, const ImportOptions& options, Progress& progress) {
   ImportOptions heard = options;
   heard.warn = [&](const std::string& line) { progress.warn(line); };
-  Surface surface = import_surface(paths.front(), heard);
-  for (std::size_t p = 1; p < paths.size(); ++p) append(surface, import_surface(paths[p], heard));
+  Surface surface = import_parts(paths, heard, progress);
   for (const std::string& line : size_warnings(surface)) progress.warn(line);
   for (const std::string& line : refinement_notes(surface)) progress.say(line);
   return surface;

@@ -37,11 +37,26 @@ simulate::PartSettings& settings_of(simulate::Scene& scene, const std::string& p
   return settings;
 }
 
+// Where an option names a part twice (or all of them), the last would win without a word.
+void refuse_twice(const std::vector<std::string>& texts, const char* option, const char* example) {
+  std::vector<std::string> parts;
+  for (const std::string& text : texts) parts.push_back(split_part(text, option, example).part);
+  std::sort(parts.begin(), parts.end());
+  const auto twice = std::adjacent_find(parts.begin(), parts.end());
+  if (twice == parts.end()) return;
+  throw InputError(
+      twice->empty()
+          ? fmt::format("{} is given twice: leave one out, or say of which part it is: {} \"PART={}\"",
+                        option, option, example)
+          : fmt::format("{} is given twice for part \"{}\": leave one out", option, *twice));
+}
+
 // A material must be known before the work begins.
 void plan_materials(const JobArguments& arguments, simulate::Scene& scene) {
   std::vector<std::string> known;
   for (const auto& [name, material] : scene.materials) known.push_back(name);
   for (const simulate::Material& material : simulate::material_library()) known.push_back(material.name);
+  refuse_twice(arguments.materials, "--material", "PLA");
   for (const std::string& text : arguments.materials) {
     const OfPart given = split_part(text, "--material", "PLA");
     const auto is_given = [&](const auto& own) {
@@ -63,6 +78,7 @@ void plan_infill(const JobArguments& arguments, simulate::Scene& scene) {
   const std::optional<double> shell =
       arguments.shell.empty() ? std::nullopt
                               : std::optional<double>(parse_quantity(arguments.shell, Dimension::length));
+  refuse_twice(arguments.infills, "--infill", "20%");
   for (const std::string& text : arguments.infills) {
     const OfPart given = split_part(text, "--infill", "20%");
     simulate::Infill& infill =

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "base/error.h"
+#include "base/program/share_scope.h"
 #include "formats/lattice/fragments_of_body.h"
 #include "formats/part/topology.h"
 #include "mapping/crack/crack_carved.h"
@@ -147,12 +148,15 @@ MappedPart map_part(Body& body, const MapOptions& options, const CrackOptions& c
     map_pieces(body, broken->fragments, options, crack.mode, mapped, progress);
     if (pieces > 0) mapped.report.crack.pieces = mapped.cracked->pieces;
   } else {
+    const double map_share = options.check_intersection ? 0.75 : 0.2;  // of the time
     if (known) {
       mapped.result = map_state(*known, body);
       complete(body, options, mapped.result);
     } else {
+      const ShareScope mapping(progress, 0, map_share);
       mapped.result = map_surface(body, options, progress);
     }
+    const ShareScope reporting(progress, map_share, 1, "checking");
     mapped.report = report(body, mapped.result);
     if (anything)
       mapped.report.crack.spanning_triangles =

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/human.h"
+#include "base/program/share_scope.h"
 #include "base/stop.h"
 #include "base/units.h"
 #include "formats/exchange/refined_file.h"
@@ -25,6 +26,13 @@ constexpr const char* kNotSplitCut =
     "the surface is cut along cracks and was not split: where its triangles are too large to show the "
     "deformation, "
     "--refine LENGTH splits them before the cut";
+
+// Of the time: a surface that may be split is mapped once or twice. One of many triangles seldom is.
+double share_of_first_map(const Body& body) {
+  constexpr std::size_t kMany = 100000;
+  if (!has_long_triangles(body)) return 1;
+  return triangle_count(body.surface) > kMany ? 0.95 : 0.2;
+}
 
 // Whether triangles of a body that broke miss too much, or are so long that they reach over what moves apart.
 bool is_coarse(const Body& body, const MapOptions& options, Progress& progress) {
@@ -47,6 +55,7 @@ void warn_of_budget(Progress& progress) {
 std::optional<Refinement> refinement_of_state(const Body& body, const MapResult& result,
                                               const std::optional<ChordError>& chord, Progress& progress) {
   if (!chord || chord->coarse_triangles == 0) return std::nullopt;
+  const ShareScope uncounted(1, 1);  // nobody knows how many rounds come
   RefinedWhereCoarse found = refine_where_coarse(body, result, chord->largest_displacement);
   if (!found.refinement.changes()) return std::nullopt;
   if (!found.ended) warn_of_budget(progress);
@@ -101,9 +110,12 @@ MappedPart map_refined(Body& body, const MapOptions& options, const CrackOptions
   using Mode = RefineOptions::Mode;
   std::optional<MappedPart> whole;
   std::optional<Refinement> refinement;
+  double first_map = 1;
   if (refine.mode == Mode::to_edge) {
     refinement = refine_to_edge(body.surface, refine.edge);
   } else {
+    if (refine.mode == Mode::automatic) first_map = share_of_first_map(body);
+    const ShareScope first(progress, 0, first_map);
     whole = map_part(body, options, crack, progress);
     if (refine.mode == Mode::automatic && !whole->cracked)
       refinement = refinement_of_state(body, whole->result, whole->report.chord, progress);
@@ -120,6 +132,7 @@ MappedPart map_refined(Body& body, const MapOptions& options, const CrackOptions
     whole->report.split_advice = SplitAdvice::none;
     return *std::move(whole);
   }
+  const ShareScope second(progress, whole ? first_map : 0, 1);
   MappedPart mapped = map_split(body, options, crack, *refinement, *std::move(split.surface), progress);
   mapped.split_line = std::move(split.line);
   return mapped;

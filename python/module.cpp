@@ -25,6 +25,7 @@ double parse(const std::string& text, const std::string& name) {
 PYBIND11_MODULE(_flexel, module) {
   module.doc() = "The libraries of Flexel; use the package flexel.";
   flexel::never_end_process();
+  flexel::python::watch_forks();
   flexel::python::translate_errors();
   module.attr("version") = flexel::version();
   module.def("set_program_folder", &flexel::set_program_folder);

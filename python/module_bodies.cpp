@@ -1,4 +1,5 @@
 // Bodies: lattices, and what runs found in them.
+#include "formats/exchange/body_name.h"
 #include "formats/lattice/body_file.h"
 #include "python/module.h"
 #include "python/module_objects.h"
@@ -79,7 +80,11 @@ void add_bodies(py::module_& module) {
                              })
       .def("write",
            [](const BodyObject& object, const std::string& path, bool compress, const py::object& heard) {
-             return run_work(heard, [&] { write_body(object.body, path, {.compress = compress}); });
+             return run_work(heard, [&] {
+               if (const std::string line = body_name_warning(path); !line.empty())
+                 Progress("flexel").warn(line);
+               write_body(object.body, path, {.compress = compress});
+             });
            });
   module.def("read_body", [](const std::string& path, const py::object& heard) {
     std::shared_ptr<BodyObject> object;

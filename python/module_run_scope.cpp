@@ -1,6 +1,7 @@
 // The state of a run is that of its process, as in the programs.
 #include "python/module_run_scope.h"
 
+#include <pthread.h>
 #include <pybind11/stl.h>
 
 #include <algorithm>
@@ -29,6 +30,12 @@ struct sigaction outer_interrupt {};  // Python's
 std::atomic<bool> signalled{false};   // since the outermost run began
 static_assert(std::atomic<bool>::is_always_lock_free);
 thread_local bool tells_progress = false;  // Python's function of progress has the thread
+bool forked_within_run = false;
+
+// Of a fork's child: no thread of it will ever give back what a run holds.
+void look_at_fork() {
+  forked_within_run = forked_within_run || runs > 0;
+}
 
 void on_interrupt(int signal) {
   signalled = true;
@@ -167,6 +174,11 @@ Said run_work(const py::object& progress, const std::function<void()>& work) {
   // Progress may come from any thread of the run, which holds the lock.
   if (tells_progress)
     throw InputError("a function of progress cannot run anything itself: run it after, or in on_frame");
+  if (forked_within_run)
+    throw InputError(
+        "this process was forked while a run went on, and cannot run anything: fork before, or start "
+        "processes with "
+        "multiprocessing.get_context(\"spawn\")");
   Said said;
   Listener listener(progress, said);
   const bool takes_signals = on_main_thread();
@@ -187,6 +199,10 @@ Said run_work(const py::object& progress, const std::function<void()>& work) {
   if (!error) return said;
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();
   std::rethrow_exception(error);
+}
+
+void watch_forks() {
+  pthread_atfork(nullptr, nullptr, look_at_fork);
 }
 
 void translate_errors() {

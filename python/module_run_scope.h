@@ -26,6 +26,9 @@ Said run_work(const py::object& progress, const std::function<void()>& work);
 // Within `work`: calls `callback` with the GIL; what it throws ends the run.
 void call_back(const std::function<void()>& callback);
 
+// A process that is forked while a run goes on refuses runs of its own, which would wait for ever.
+void watch_forks();
+
 // Errors of the libraries become classes of flexel.errors.
 void translate_errors();
 

@@ -133,7 +133,8 @@ simulate::SimulateOptions simulate_options(const py::dict& given) {
   options.history = taken<std::string>(given, "history");
   options.failed_output = taken<std::string>(given, "failed");
   options.isa = taken<std::string>(given, "isa");
-  if (const py::object callback = given["on_frame"]; !callback.is_none())
+  // Shared: options are copied where a run has no GIL, and references of Python are not counted without it.
+  if (const auto callback = std::make_shared<const py::object>(given["on_frame"]); !callback->is_none())
     options.on_frame = [callback](const Body& body, double time) {
       call_back([&] {
         auto frame = std::make_shared<FrameObject>(FrameObject{time, &body});
@@ -141,7 +142,7 @@ simulate::SimulateOptions simulate_options(const py::dict& given) {
           FrameObject& frame;
           ~Closes() { frame.body = nullptr; }
         } const closes{*frame};
-        callback(frame);
+        (*callback)(frame);
       });
     };
   return options;

@@ -8,6 +8,7 @@
 #include "base/program/arguments.h"
 #include "base/program/program.h"
 #include "base/program/termination.h"
+#include "formats/exchange/body_name.h"
 #include "formats/lattice/body_file.h"
 #include "formats/lattice/merge.h"
 #include "simulate/answer.h"
@@ -207,6 +208,7 @@ int run(int argc, char** argv) {
       throw InputError(
           "--live writes frames to stdout: name the body's file with -o, or give --live tcp:PORT");
   }
+  if (const std::string line = body_name_warning(arguments.output); !line.empty()) progress.warn(line);
   progress.stage("read");
   auto [scene, body] = read_input(arguments);
   if (arguments.output.empty()) arguments.output = std::string("-");

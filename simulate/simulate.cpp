@@ -118,6 +118,12 @@ void refuse_timed(const SimulateOptions& options, const std::string& scene) {
     throw InputError(scene, "--checkpoint is for timed runs: give [run] time = \"1 s\"");
 }
 
+// Newton's method has no kernel of explicit steps.
+void refuse_kernel(const SimulateOptions& options, const std::string& scene) {
+  if (!options.isa.empty())
+    throw InputError(scene, "--isa is for timed runs: give [run] time = \"1 s\", or leave it out");
+}
+
 class Run {
  public:
   Run(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress)
@@ -244,6 +250,7 @@ SimulateResult Run::operator()() {
     effects.push_back(activate(FusedPoints(body_, std::move(fused))));
   refuse_timed(effects, ActsIn::all, scene_.name);
   refuse_timed(options_, scene_.name);
+  refuse_kernel(options_, scene_.name);
   report_effects(effects, "the parts' models, equilibrium by Newton's method", options_.explain, progress_);
   report_strays(fragments_, result, progress_);
   report_unsupported(unsupported_, result, progress_);
@@ -449,6 +456,7 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   }
   if (is_quadratic(scene, body)) {
     refuse_timed(options, scene.name);
+    refuse_kernel(options, scene.name);
     SimulateResult result = run_and_judge(body, scene, options, progress);
     progress.finish();
     return result;

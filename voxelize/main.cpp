@@ -19,7 +19,8 @@
 #include "base/resources.h"
 #include "base/units.h"
 #include "formats/common/file_formats.h"
-#include "formats/exchange/import.h"
+#include "formats/exchange/body_name.h"
+#include "formats/exchange/import_parts.h"
 #include "formats/exchange/size_warning.h"
 #include "formats/exchange/vdb_file.h"
 #include "formats/lattice/body_file.h"
@@ -117,12 +118,10 @@ ImportOptions import_options(const Arguments& arguments) {
   return options;
 }
 
-Surface import_all(const Arguments& arguments, const ImportOptions& options) {
+Surface import_all(const Arguments& arguments, const ImportOptions& options, Progress& progress) {
   std::vector<std::string> files = arguments.parts;
   if (files.empty()) files.emplace_back("-");
-  Surface surface = import_surface(files[0], options);
-  for (std::size_t n = 1; n < files.size(); ++n) append(surface, import_surface(files[n], options));
-  return surface;
+  return import_parts(files, options, progress);
 }
 
 int run(int argc, char** argv) {
@@ -141,8 +140,9 @@ int run(int argc, char** argv) {
   const ThreadLimit threads(arguments.threads);
   Progress progress(kName, arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   how.warn = [&](const std::string& line) { progress.warn(line); };
+  if (const std::string line = body_name_warning(arguments.output); !line.empty()) progress.warn(line);
   progress.stage("import");
-  Surface surface = import_all(arguments, how);
+  Surface surface = import_all(arguments, how, progress);
   for (const std::string& line : size_warnings(surface)) progress.warn(line);
   for (const std::string& line : refinement_notes(surface)) progress.say(line);
   const VoxelizeResult result = voxelize(std::move(surface), options, progress);

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/nearest_word.h"
+#include "base/program/share_scope.h"
 #include "base/resources.h"
 #include "base/stop.h"
 #include "base/units.h"
@@ -150,10 +151,21 @@ void measure_walls(const PartMesh& mesh, std::uint32_t part, int lines, Voxelize
   found.fifth_wall = std::min(found.fifth_wall, fifth_wall(samples, found.surface_volume));
 }
 
+// A scope for part p of those that move a stage from one share to another.
+struct Stretch {
+  Progress& progress;
+  double from, to;
+  [[nodiscard]] ShareScope part(std::size_t p, std::size_t parts, const std::string& name) const {
+    const double each = (to - from) / static_cast<double>(parts);
+    return {progress, from + each * static_cast<double>(p), from + each * static_cast<double>(p + 1), name};
+  }
+};
+
 // What does not depend on the lattice but where shells interpenetrate: volumes and walls.
-void measure(const std::vector<HealedPart>& meshes, VoxelizeResult& result) {
+void measure(const std::vector<HealedPart>& meshes, VoxelizeResult& result, const Stretch& stretch) {
   const int lines = wall_lines(128, meshes.size());
   for (std::size_t p = 0; p < meshes.size(); ++p) {
+    const ShareScope scope = stretch.part(p, meshes.size(), "walls");
     VoxelizedPart& found = result.parts[p];
     if (found.closed)
       found.surface_volume =
@@ -164,10 +176,13 @@ void measure(const std::vector<HealedPart>& meshes, VoxelizeResult& result) {
 }
 
 // The parts, healed; the polygons of `surface` face as they do then.
-std::vector<HealedPart> heal_parts(Surface& surface, const HealChoice& how, double memory) {
+std::vector<HealedPart> heal_parts(Surface& surface, const HealChoice& how, double memory,
+                                   Progress& progress) {
   std::vector<HealedPart> healed;
-  for (PartMesh& mesh : exact_part_meshes(surface)) {
+  std::vector<PartMesh> meshes = exact_part_meshes(surface);
+  for (PartMesh& mesh : meshes) {
     const std::string& name = surface.parts[healed.size()].name;
+    const ShareScope scope = Stretch{progress, 0, 1}.part(healed.size(), meshes.size(), name);
     refuse_fine_wrap(mesh, how, memory, name);
     healed.push_back(heal(std::move(mesh), how, name));
   }
@@ -237,13 +252,13 @@ std::string file_of(const Surface& surface, std::size_t part) {
 
 // All parts at one spacing.
 VoxelizeResult build(Surface& surface, std::vector<HealedPart>& meshes, double spacing,
-                     const VoxelizeOptions& options, Progress& progress) {
+                     const VoxelizeOptions& options, const Stretch& stretch) {
   VoxelizeResult result;
   PolygonCells polygon_cells;
   std::vector<UndecidedPart> open;
   for (std::size_t p = 0; p < meshes.size(); ++p) {
     check_stop();
-    progress.update(static_cast<double>(p) / static_cast<double>(meshes.size()), surface.parts[p].name);
+    const ShareScope scope = stretch.part(p, meshes.size(), surface.parts[p].name);
     if (auto part =
             voxelize_part(meshes[p], spacing, options, surface.parts[p].name, result.body, polygon_cells))
       result.parts.push_back(std::move(*part));
@@ -266,6 +281,10 @@ double total_cells(const VoxelizeResult& result, Placement placement) {
     total += static_cast<double>(placement == Placement::corner ? part.cells : part.elements);
   return total;
 }
+
+// Of the stage: where the lattice is made; and how much of what is left until there each trial of a count takes, as if two
+// more were to come.
+constexpr double kBuilt = .8, kOfRest = .4;
 
 // The body at the spacing for the count asked for. The estimate is rough for thin parts: it is scaled by what
 // came out, again while the count is off by more than a tenth (of rounded spacings, what half a step makes of
@@ -323,15 +342,17 @@ VoxelizeOptions without_moments(VoxelizeOptions options) {
 
 VoxelizeResult correct_count(VoxelizeResult result, double spacing, std::vector<HealedPart>& meshes,
                              const std::vector<PartExtent>& extents, const VoxelizeOptions& options,
-                             Progress& progress) {
+                             Stretch stretch) {
   constexpr int kCorrections = 3;
   CountSearch search(extents, options);
   search.add(spacing, total_cells(result, options.placement));
   Surface surface;
   const auto build_at = [&](double next, const VoxelizeOptions& how) {
+    stretch.from = stretch.to;
+    stretch.to += kOfRest * (kBuilt - stretch.to);
     spacing = next;
     check_spacing(spacing, meshes, surface);
-    result = build(surface, meshes, spacing, how, progress);
+    result = build(surface, meshes, spacing, how, stretch);
   };
   const VoxelizeOptions quick = without_moments(options);
   for (int n = 0; n < kCorrections && !search.close(); ++n) {
@@ -368,7 +389,7 @@ VoxelizeResult voxelize(Surface surface, const VoxelizeOptions& options, Progres
     throw InputError("--moments: centre placement has no cells; use --placement corner");
   progress.stage("heal");
   const double limit = options.max_memory.value_or(memory_to_use());
-  std::vector<HealedPart> meshes = heal_parts(surface, options.heal, limit);
+  std::vector<HealedPart> meshes = heal_parts(surface, options.heal, limit, progress);
   check_meshes(meshes, surface);
   progress.stage("voxelize");
   const std::vector<PartExtent> extents = extents_of(meshes);
@@ -380,14 +401,15 @@ VoxelizeResult voxelize(Surface surface, const VoxelizeOptions& options, Progres
         std::min(estimate_cells(extents[p], spacing, options.placement), cells_of_box(meshes[p], spacing));
   check_elements(estimate / 2, "");  // a lattice has more elements than cells, and the estimate may be high
   check_memory(estimate, options, limit, extents);
+  const Stretch first{progress, 0, options.size ? kBuilt : kOfRest * kBuilt};
   VoxelizeResult result =
-      build(surface, meshes, spacing, options.size ? options : without_moments(options), progress);
+      build(surface, meshes, spacing, options.size ? options : without_moments(options), first);
   result.size = spacing;
-  if (!options.size) result = correct_count(std::move(result), spacing, meshes, extents, options, progress);
+  if (!options.size) result = correct_count(std::move(result), spacing, meshes, extents, options, first);
   const double cells = total_cells(result, options.placement);
   check_elements(static_cast<double>(result.body.element_count()), "");
   check_memory(cells, options, limit, extents);
-  measure(meshes, result);
+  measure(meshes, result, {progress, kBuilt, 1});
   std::vector<double> cell;
   for (const VoxelizedPart& part : result.parts) cell.push_back(part.spacing.maxCoeff());
   result.pairs = noteworthy_pairs(meshes, cell);

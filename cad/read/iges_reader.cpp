@@ -30,6 +30,7 @@
 #include "base/error.h"
 #include "base/files/memory_file.h"
 #include "cad/read/occt.h"
+#include "cad/read/tells_share.h"
 #include "formats/common/readers.h"
 
 namespace flexel::cad {
@@ -124,7 +125,12 @@ CadShape read_entities(const std::string& path, const CadReadJob& job) {
   reader.SetReadVisible(Standard_False);
   if (reader.ReadFile(path.c_str()) != IFSelect_RetDone)
     throw InputError(job.where, "is damaged: OpenCASCADE cannot make sense of it as IGES");
-  reader.TransferRoots();
+  constexpr double kLoaded = .3, kTransferred = .7;  // of the time
+  tell_share(kLoaded);
+  {
+    const ShareScope transferring(kLoaded, kTransferred);
+    reader.TransferRoots(TellsShare::begin()->Start());
+  }
   TopoDS_Shape shape = reader.OneShape();
   if (shape.IsNull()) throw InputError(job.where, "holds no shape");
   const auto looks = std::make_shared<Looks>(looks_in(reader));

@@ -30,6 +30,7 @@
 #include "base/math/area_vector.h"
 #include "cad/read/assembly_paths.h"
 #include "cad/read/occt.h"
+#include "cad/read/tells_share.h"
 
 namespace flexel::cad {
 namespace {
@@ -59,7 +60,7 @@ void tessellate(const TopoDS_Shape& solid, double unit, const CadReadJob& job) {
   parameters.InParallel = Standard_True;
   if (!(parameters.Deflection > 0) || !(parameters.Angle > 0))
     throw InputError(job.where, "the deflection of the tessellation must be positive");
-  BRepMesh_IncrementalMesh mesher(solid, parameters);
+  BRepMesh_IncrementalMesh mesher(solid, parameters, TellsShare::begin()->Start());
 }
 
 // The triangulated faces of one solid. Node i (from 1) of face f is node_base[f] + i - 1.
@@ -225,7 +226,12 @@ CadMesh mesh_of(const CadShape& shape, const CadReadJob& job) {
   mesh.surface.polygon_offsets.push_back(0);
   const std::vector<std::string> assemblies = assembly_paths(shape);
   std::vector<std::optional<ShapeColor>> colors;  // (faces)
-  for (const TopoDS_Shape& solid : solids_of(*shape.shape, job.where)) {
+  const std::vector<TopoDS_Shape> solids = solids_of(*shape.shape, job.where);
+  for (const TopoDS_Shape& solid : solids) {
+    const auto share = [&](std::size_t done) {
+      return static_cast<double>(done) / static_cast<double>(solids.size());
+    };
+    const ShareScope scope(share(mesh.surface.parts.size()), share(mesh.surface.parts.size() + 1));
     tessellate(solid, shape.unit, job);
     const std::size_t part = mesh.surface.parts.size();
     add_solid(mesh.surface, solid, shape.unit, shape.labels, colors);

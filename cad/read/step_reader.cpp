@@ -28,6 +28,7 @@
 #include "cad/read/occt.h"
 #include "cad/read/step_names.h"
 #include "cad/read/step_reader.h"
+#include "cad/read/tells_share.h"
 
 namespace flexel::cad {
 namespace {
@@ -144,8 +145,13 @@ TopoDS_Shape transfer_step(STEPControl_Reader& reader, const CadReadJob& job, co
   MemoryStream stream(job.bytes);
   if (reader.ReadStream(job.file.c_str(), stream) != IFSelect_RetDone)
     throw InputError(job.where, "is damaged: OpenCASCADE cannot make sense of it as STEP");
+  constexpr double kLoaded = .3, kTransferred = .9;  // of the time
+  tell_share(kLoaded);
   const std::string damage = check_loaded(reader, job);
-  transfer_roots();
+  {
+    const ShareScope transferring(kLoaded, kTransferred);
+    transfer_roots();
+  }
   const TopoDS_Shape shape = reader.OneShape();
   const SolidCount solids = count_solids(reader);
   if (!damage.empty() && (shape.IsNull() || solids.sound == 0 || solids.unsound + solids.missing > 0 ||
@@ -188,8 +194,8 @@ void tell_tessellated(const CadReadJob& job, bool all, const Warn& warn) {
 CadShape read_step(const CadReadJob& job, const Warn& warn) {
   STEPControl_Reader reader;
   CadShape result;
-  result.shape =
-      std::make_shared<TopoDS_Shape>(transfer_step(reader, job, warn, [&] { reader.TransferRoots(); }));
+  result.shape = std::make_shared<TopoDS_Shape>(
+      transfer_step(reader, job, warn, [&] { reader.TransferRoots(TellsShare::begin()->Start()); }));
   result.unit = kMillimetre;
   tell_tessellated(job, result.shape->IsNull(), warn);
   const auto names = std::make_shared<StepNames>(reader);

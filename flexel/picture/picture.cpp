@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/human.h"
+#include "base/program/share_scope.h"
 #include "base/stop.h"
 #include "flexel/picture/canvas/text.h"
 #include "flexel/picture/face_labels.h"
@@ -20,6 +21,7 @@
 namespace flexel::picture {
 namespace {
 
+constexpr double kPanels = 0.25;  // of the time, until it is known what is drawn
 constexpr std::uint32_t kPaper = 0xfafbfc, kRestInk = 0x7a8794;
 
 double range_end(const std::string& text, std::optional<Dimension> dimension) {
@@ -211,8 +213,11 @@ double exaggeration_of(const std::vector<PictureSubject>& subjects, const Pictur
 std::vector<Panel> make_panels(const std::vector<PictureSubject>& subjects, const PictureOptions& options,
                                const ColourBy& by, std::size_t sides, Progress& progress) {
   std::vector<Panel> panels;
+  const std::size_t count = subjects.size() * sides;
   for (const PictureSubject& subject : subjects)
     for (std::size_t side = 0; side < sides; ++side) {
+      const double begun = kPanels * static_cast<double>(panels.size()), all = static_cast<double>(count);
+      const ShareScope scope(progress, begun / all, (begun + kPanels) / all);
       panels.push_back(make_panel(subject, options, by, progress));
       check_stop();
     }
@@ -223,6 +228,7 @@ std::vector<Panel> make_panels(const std::vector<PictureSubject>& subjects, cons
 
 PictureResult draw_picture(const std::vector<PictureSubject>& subjects, const PictureOptions& given,
                            Progress& progress) {
+  if (subjects.empty()) throw InputError("nothing to draw: a picture is of parts or bodies");
   PictureOptions options = given;
   options.exaggeration = exaggeration_of(subjects, given);
   // The fill is a property of cells: on the surface it would be smeared.
@@ -242,7 +248,7 @@ PictureResult draw_picture(const std::vector<PictureSubject>& subjects, const Pi
   std::optional<Legend> legend;
   if (!by.name.empty()) legend = make_legend(panels, by, options, result.notes);
   hint_at_scale(panels, *options.exaggeration, result.notes);
-  progress.update(0.25, "choosing the view");
+  progress.update(kPanels, "choosing the view");
   const Layout layout = lay_out(panels.size(), options, legend ? &*legend : nullptr);
   if (views.empty()) {
     views = {choose_view(panels, options, result.notes)};

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/nearest_word.h"
 #include "base/parallel.h"
+#include "base/program/share_scope.h"
 #include "base/units.h"
 #include "flexel/picture/attribute.h"
 #include "formats/lattice/body_file.h"
@@ -186,9 +187,17 @@ void show_body(const Body& body, const ViewOptions& options, const std::string& 
   }
   mapping::MapOptions how;
   how.method = mapping::default_method(body);
-  mapping::MapResult mapped = map_surface(body, how, progress);
+  constexpr double kFirst = 0.3, kMapped = 0.5;  // of the time
+  mapping::MapResult mapped = [&] {
+    const ShareScope first(progress, 0, kFirst);
+    return map_surface(body, how, progress);
+  }();
   const std::optional<Body> split = split_where_coarse(body, mapped, progress);
-  if (split) mapped = map_surface(*split, how, progress);
+  if (split) {
+    const ShareScope second(progress, kFirst, kMapped);
+    mapped = map_surface(*split, how, progress);
+  }
+  progress.update(kMapped, "drawing");
   const Body& shown = split ? *split : body;
   file.surface = begin_surface(shown.surface, file);
   std::vector<std::string> names = field_names(&shown, shown.surface);

@@ -2,6 +2,7 @@
 #include "formats/cad/cad_job.h"
 
 #include "base/error.h"
+#include "base/program/share_scope.h"
 
 namespace flexel {
 
@@ -105,8 +106,8 @@ CadJob unpack_job(std::span<const std::byte> bytes) {
 
 CadMesh run_job(const CadReadJob& job, const ChildLimits& limits, const std::string& instead,
                 const std::function<void(const std::string&)>& warn) {
-  const Bytes answer =
-      run(pack(job), limits, job.where, {"read it", "is damaged", "is damaged, or too much", instead});
+  const Bytes answer = run(pack(job), limits, job.where,
+                           {"read it", "is damaged", "is damaged, or too much", instead}, tell_share);
   return result_of(unpack_mesh(answer, job.where), job.where, warn);
 }
 

@@ -72,7 +72,8 @@ Bytes answer_in(Bytes output, const TellShare& hear) {
   const std::size_t shares = read_shares(output, share);
   if (shares == 0) return output;
   if (hear) hear(share);
-  return Bytes(output.begin() + static_cast<std::ptrdiff_t>(shares), output.end());
+  output.erase(output.begin(), output.begin() + static_cast<std::ptrdiff_t>(shares));
+  return output;
 }
 
 Bytes run_job(const ForeignProgram& program, const Bytes& job, const ChildLimits& limits,

@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/nearest_word.h"
 #include "base/parallel.h"
+#include "base/program/share_scope.h"
 #include "formats/common/file_formats.h"
 #include "formats/common/readers.h"
 #include "formats/exchange/unread_formats.h"
@@ -177,7 +178,13 @@ Surface import_surface(const std::string& path, const ImportOptions& options) {
   check_encoding(input);
   const FileReader& reader = reader_of(input, options, path);
   check_text(input, reader);
-  HashedSurface read = read_and_hash(input, reader, options);
+  constexpr double kLoaded = .1, kRead = .85;  // of the time, of large files of any format
+  tell_share(kLoaded);
+  HashedSurface read = [&] {
+    const ShareScope reading(kLoaded, kRead);
+    return read_and_hash(input, reader, options);
+  }();
+  tell_share(kRead);
   Surface& surface = read.surface;
   surface.sources.at(0).file = input.file;
   surface.sources.at(0).hash = read.hash;

@@ -21,6 +21,7 @@
 #include <map>
 
 #include "base/error.h"
+#include "base/program/share_scope.h"
 #include "formats/part/topology.h"
 
 namespace flexel::mapping {
@@ -227,7 +228,10 @@ SurfaceMeetings new_meetings(const Body& body, const std::vector<Vec3>& displace
   const auto part_of = [&](std::uint32_t t) { return surface.polygon_part(triangles.polygon[t]); };
   std::map<std::array<std::uint32_t, 2>, std::vector<double>> meetings;
   SurfaceMeetings found;
+  constexpr std::size_t kPairsPerTriangle = 7;  // that touch at a corner, or nearly
+  ShareCounter done(kPairsPerTriangle * boxes.size());
   CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const TriangleBox& a, const TriangleBox& b) {
+    done.add(1);
     const Corners &first = triangles.corners[a.info()], &second = triangles.corners[b.info()];
     if (share_a_corner(first, second) || !meet(moved, first, second) || meet(surface.vertices, first, second))
       return;

@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/math/dense.h"
 #include "base/nearest_word.h"
+#include "base/program/share_scope.h"
 #include "base/stop.h"
 #include "mapping/anchors/frame.h"
 #include "mapping/checks/cgal_checks.h"
@@ -58,6 +59,9 @@ void make_checks(const Body& body, const MapOptions& options, MapResult& result)
   if (options.check_intersection && finite) result.new_meetings = new_meetings(body, result.displacement);
 }
 
+// Of the time: where vertices have their anchors, and where the state is mapped.
+constexpr double kLocated = 0.3, kMapped = 0.95, kMappedBeforeChecks = 0.4;
+
 const std::vector<std::string> kFarNames = {"follow", "rigid", "refuse"};  // by FarVertices
 const std::vector<std::string> kChecks = {"voronoi", "self-intersection"};
 
@@ -104,16 +108,26 @@ void complete(const Body& body, const MapOptions& options, MapResult& result) {
 }
 
 MapResult map_surface(const Body& body, const MapOptions& options, Progress& progress) {
-  return map_surface(body, options, locate_vertices(body), progress);
+  const VertexAnchors anchors = [&] {
+    const ShareScope locating(progress, 0, kLocated, "binding vertices");
+    return locate_vertices(body);
+  }();
+  return map_surface(body, options, anchors, progress);
 }
 
 MapResult map_surface(const Body& body, const MapOptions& options, const VertexAnchors& anchors,
                       Progress& progress) {
-  progress.update(0, "binding vertices");
-  MapResult result = map_state(bind(body, options.method, anchors), body);
-  progress.update(0.8, "checking");
+  const bool checks = options.check_voronoi || options.check_intersection;
+  const double mapped = checks ? kMappedBeforeChecks : kMapped;
+  MapResult result = [&] {
+    const ShareScope binding(progress, kLocated, mapped, "binding vertices");
+    const Binding found = bind(body, options.method, anchors);
+    tell_share(0.5);
+    return map_state(found, body);
+  }();
+  const ShareScope checking(progress, mapped, 1, "checking");
   complete(body, options, result);
-  progress.update(1);
+  tell_share(1);
   return result;
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/parallel.h"
+#include "base/program/share_scope.h"
 #include "formats/lattice/fragments_of_body.h"
 #include "formats/part/near_weld.h"
 #include "mapping/methods/space_map.h"
@@ -76,9 +77,11 @@ std::vector<MissedPoint> look_at(const std::vector<FlatTriangle>& triangles, con
                                  const SpaceMap& map) {
   constexpr std::size_t kTrianglesAtATime = 64;
   std::vector<MissedPoint> found(triangles.size());
+  ShareCounter done(triangles.size());
   parallel_chunks(triangles.size(), kTrianglesAtATime, [&](std::size_t begin, std::size_t end) {
     FlatTriangles look(body, map);
     for (std::size_t t = begin; t < end; ++t) found[t] = look(triangles[t]);
+    done.add(end - begin);
   });
   return found;
 }

@@ -19,8 +19,9 @@ import shutil
 from typing import Any, Callable, Dict, List, Optional, Sequence, Union
 
 from . import _flexel
-from ._objects import Body, Frame, Mapped, Part, Result, check_outputs, write_whole
+from ._objects import Body, Frame, Mapped, Part, Result, Shown, check_outputs, write_whole
 from ._options import Quantity, is_scene_text, length, paths, refuse_limits, words
+from ._options import path as path_text
 from ._said import Progress, heard
 from .errors import (DivergedError, FlexelError, FlexelWarning, InputError, InvalidMappingError, StoppedByTimeout)
 
@@ -88,8 +89,16 @@ def voxelize(part: Union[Part, Paths], *, size: Optional[Quantity] = None, count
 
 def read_body(path: Union[str, os.PathLike], *, progress: Progress = None) -> Body:
     """Reads a body file (.vtu). Raises InputError."""
-    core, said = heard(_flexel.read_body, os.fspath(path), progress=progress)
-    return Body(core, "", said.warnings, os.path.basename(os.fspath(path)), _absolute([os.fspath(path)]))
+    name = path_text(path)
+    core, said = heard(_flexel.read_body, name, progress=progress)
+    return Body(core, "", said.warnings, os.path.basename(name), _absolute([name]))
+
+
+def _core_of(body) -> "_flexel.Body":
+    if isinstance(body, Body):
+        return body._core
+    hint = ": give its .body" if isinstance(body, (Result, Mapped)) else ""
+    raise TypeError(f"body: a flexel.Body is needed, not a {type(body).__name__}{hint}")
 
 
 def simulate(body: Body, scene: Union[str, os.PathLike, None] = None, *, on_frame: Optional[Callable[[Frame], Any]] = None,
@@ -105,19 +114,20 @@ def simulate(body: Body, scene: Union[str, os.PathLike, None] = None, *, on_fram
     energies. failed: where the last good state goes when the run fails (.vtu). force: they may replace what was read.
     Raises InputError, DivergedError, KeyboardInterrupt.
     """
-    inputs = list(body._files)
+    core_body, inputs = _core_of(body), list(body._files)
+    history, failed = path_text(history or ""), path_text(failed or "")
     callback = None if on_frame is None else lambda core: on_frame(Frame(core, inputs))
-    given = {"threads": threads, "estimate": estimate, "stress": stress, "history": os.fspath(history),
-             "failed": os.fspath(failed), "isa": isa, "on_frame": callback}
+    given = {"threads": threads, "estimate": estimate, "stress": stress, "history": history, "failed": failed, "isa": isa,
+             "on_frame": callback}
     text, name = "", ""
     line = words(options)
     if is_scene_text(scene):
         text, name = scene, "scene"
     elif scene is not None:
-        line.append("--scene=" + os.fspath(scene))
-        inputs += _absolute([os.fspath(scene)])
+        line.append("--scene=" + path_text(scene))
+        inputs += _absolute([path_text(scene)])
     check_outputs([history, failed], inputs, force)
-    core, said = heard(_flexel.simulate, body._core, line, text, name, given, progress=progress)
+    core, said = heard(_flexel.simulate, core_body, line, text, name, given, progress=progress)
     return Result(core, said, {}, body.label, inputs)
 
 
@@ -128,7 +138,8 @@ def map(body: Body, *, output: Union[str, os.PathLike, None] = None, progress: P
     A coarse mesh gets more triangles where they are needed to show the bend; refine="off" keeps its vertices.
     Raises InputError, also where `output` is a file that the body came from, unless force=True; InvalidMappingError.
     """
-    core, said = heard(_flexel.map, body._core, words(options), "" if output is None else os.fspath(output), body._files,
+    core_body = _core_of(body)
+    core, said = heard(_flexel.map, core_body, words(options), "" if output is None else path_text(output), body._files,
                        progress=progress)
     options.pop("force", None)
     return Mapped(core, body, options, said.warnings)
@@ -166,7 +177,7 @@ def study(part: Paths, *, output: Union[str, os.PathLike], progress: Progress = 
     """What accuracy costs in time, as `flexel study`: writes study.html, study.csv and study.json to the folder `output`, and
     returns what study.json holds. options: scene, fix, push, material, budget="2 min", reference, against.
     """
-    code, _ = heard(_flexel.run_command, "study", words(options) + ["--output=" + os.fspath(output), "--"] + paths(part),
+    code, _ = heard(_flexel.run_command, "study", words(options) + ["--output=" + path_text(output), "--"] + paths(part),
                     progress=progress)
     if code:
         raise KeyboardInterrupt
@@ -176,6 +187,11 @@ def study(part: Paths, *, output: Union[str, os.PathLike], progress: Progress = 
 
 def _subjects(shown) -> List:
     items = shown if isinstance(shown, (list, tuple)) else [shown]
+    for each in items:
+        if not isinstance(each, Shown):
+            raise TypeError(f"{each!r} cannot be shown: parts, bodies and results can")
+    if not items:
+        raise InputError("nothing is given that could be shown")
     bodies = [each.body if isinstance(each, (Result, Mapped)) else each for each in items]
     return [(each.label, body._core) for each, body in zip(items, bodies)]
 
@@ -192,7 +208,9 @@ def picture(shown, path: Union[str, os.PathLike, None] = None, *, force: bool = 
     range="0:5 mm", up="y". Raises InputError, also where `path` is a file that was read, unless `force`.
     """
     refuse_limits(options)
+    subjects = _subjects(shown)
     if path is not None:
+        path = path_text(path)
         check_outputs([path], _files_of(shown), force)
     line: List[str] = []
     for name, value in options.items():
@@ -200,7 +218,7 @@ def picture(shown, path: Union[str, os.PathLike, None] = None, *, force: bool = 
             line.append("--" + name.replace("_", "-"))
         elif value is not None and value is not False:
             line.append(f"--{name.replace('_', '-')}={value}")
-    png, _ = heard(_flexel.picture, _subjects(shown), line, progress=progress)
+    png, _ = heard(_flexel.picture, subjects, line, progress=progress)
     if path is not None:
         write_whole(png, path)
     return png

@@ -12,7 +12,8 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 import numpy as np
 
 from . import _flexel
-from ._options import words
+from ._options import length, words
+from ._options import path as path_text
 from ._said import Progress, heard
 from .errors import InputError
 
@@ -40,7 +41,7 @@ def _inline(page: str, what: str) -> str:
 
 def check_outputs(outputs: Sequence, inputs: Sequence[str], force: bool) -> None:
     """Raises InputError where a result would replace what was read, unless `force`."""
-    _flexel.check_outputs([os.fspath(each) for each in outputs if each], list(inputs), force)
+    _flexel.check_outputs([path_text(each) for each in outputs if each], list(inputs), force)
 
 
 def write_whole(data: bytes, path) -> None:
@@ -62,6 +63,26 @@ def write_whole(data: bytes, path) -> None:
         if os.path.exists(temporary):
             os.unlink(temporary)
         raise
+
+
+def _plain(values, what: str, name: str):
+    """Raises InputError where numpy would leave out a part of them: masks, imaginary parts."""
+    if np.ma.is_masked(values):
+        raise InputError(f"{what} are masked: fill or drop what is", name)
+    if np.iscomplexobj(values):
+        raise InputError(f"{what} are complex", name)
+    return values
+
+
+def _polygon_table(corners: np.ndarray, points: int, name: str) -> np.ndarray:
+    """The rows of a PLY file."""
+    if corners.ndim != 2 or not 3 <= corners.shape[1] <= 255 or corners.dtype.kind not in "iu":
+        raise InputError(f"faces have the shape {corners.shape} and type {corners.dtype}: (m, 3) indices are needed", name)
+    if len(corners) and not (0 <= int(corners.min()) and int(corners.max()) < points):
+        raise InputError("a face names a vertex that is not there", name)
+    table = np.zeros(len(corners), dtype=[("n", "u1"), ("v", "<i4", (corners.shape[1],))])
+    table["n"], table["v"] = corners.shape[1], corners
+    return table
 
 
 class Shown:
@@ -101,35 +122,38 @@ class Part(Shown):
         vertices: (n, 3) in `unit` (a length unit's name; default metres). faces: (m, 3) or (m, 4) indices, outward.
         A mesh without groups is cut into faces at dihedral angles over 30 degrees. Raises InputError.
         """
-        points = np.ascontiguousarray(vertices, dtype="<f8")
-        corners = np.ascontiguousarray(faces)
-        if points.ndim != 2 or points.shape[1] != 3:
-            raise InputError(f"vertices have the shape {points.shape}, not (n, 3)", name)
-        if corners.ndim != 2 or not 3 <= corners.shape[1] <= 255 or corners.dtype.kind not in "iu":
-            raise InputError(f"faces have the shape {corners.shape} and type {corners.dtype}: (m, 3) indices are needed", name)
-        if len(corners) and not (0 <= int(corners.min()) and int(corners.max()) < len(points)):
-            raise InputError("a face names a vertex that is not there", name)
-        table = np.zeros(len(corners), dtype=[("n", "u1"), ("v", "<i4", (corners.shape[1],))])
-        table["n"], table["v"] = corners.shape[1], corners
-        head = ("ply\nformat binary_little_endian 1.0\n"
-                f"element vertex {len(points)}\nproperty double x\nproperty double y\nproperty double z\n"
-                f"element face {len(corners)}\nproperty list uchar int vertex_indices\nend_header\n")
         options: Dict[str, Any] = {"unit": unit}
         if edge is not None:
-            from ._options import length
-
             options["edge"] = length(edge)
-        core, said = heard(_flexel.part_of_bytes, head.encode() + points.tobytes() + table.tobytes(), name, options,
-                           progress=progress)
+        return cls._of_polygons(vertices, [faces], options, name, progress)
+
+    @classmethod
+    def _of_polygons(cls, vertices, blocks: Sequence, options: Dict[str, Any], name: str, progress: Progress) -> "Part":
+        """Of blocks of polygons, which have the same number of corners within a block."""
+        if not isinstance(name, str):
+            raise TypeError(f"name: {name!r} is of the wrong type")
+        points = np.ascontiguousarray(_plain(vertices, "vertices", name), dtype="<f8")
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise InputError(f"vertices have the shape {points.shape}, not (n, 3)", name)
+        tables = [_polygon_table(np.ascontiguousarray(_plain(each, "faces", name)), len(points), name) for each in blocks]
+        head = ("ply\nformat binary_little_endian 1.0\n"
+                f"element vertex {len(points)}\nproperty double x\nproperty double y\nproperty double z\n"
+                f"element face {sum(map(len, tables))}\nproperty list uchar int vertex_indices\nend_header\n")
+        file = b"".join([head.encode(), points.tobytes(), *(table.tobytes() for table in tables)])
+        core, said = heard(_flexel.part_of_bytes, file, name, options, progress=progress)
         return cls(core, name, said.warnings)
 
     @classmethod
     def from_meshio(cls, mesh, *, unit: str = "m", name: str = "part") -> "Part":
-        """A part of the triangles, else the quads, of a meshio mesh, whose points are in `unit`."""
-        for kind in ("triangle", "quad"):
-            if kind in mesh.cells_dict:
-                return cls.from_mesh(mesh.points, mesh.cells_dict[kind], unit=unit, name=name)
-        raise InputError("the mesh has neither triangles nor quads: extract its surface", name)
+        """A part of the triangles, quads and polygons of a meshio mesh, in its order, whose points are in `unit`. Raises
+        InputError: it has none, or surface cells of another kind, such as "triangle6"."""
+        flat = [block for block in mesh.cells if block.dim == 2]
+        for block in flat:
+            if block.type not in ("triangle", "quad", "polygon"):
+                raise InputError(f"the mesh has cells of type {block.type}: make triangles of them", name)
+        if not flat:
+            raise InputError("the mesh has neither triangles nor quads: extract its surface", name)
+        return cls._of_polygons(mesh.points, [block.data for block in flat], {"unit": unit}, name, None)
 
     @property
     def vertices(self) -> np.ndarray:
@@ -175,7 +199,7 @@ class Part(Shown):
         """Writes the mesh, in the unit that it came in; the ending names the format (.stl, .obj, .ply ...). Raises InputError
         where that is a file that it was read from, unless `force`."""
         check_outputs([path], self._files, force)
-        heard(_flexel.Part.write, self._core, os.fspath(path), progress=progress)
+        heard(_flexel.Part.write, self._core, path_text(path), progress=progress)
 
     def to_meshio(self):
         """The triangles as a meshio mesh, points in metres."""
@@ -278,7 +302,7 @@ class Body(Shown):
         """Writes the body (.vtu), byte for byte as the programs do. Raises InputError where that is a file that was read,
         unless `force`."""
         check_outputs([path], self._files, force)
-        heard(_flexel.Body.write, self._core, os.fspath(path), compress, progress=progress)
+        heard(_flexel.Body.write, self._core, path_text(path), compress, progress=progress)
 
     def to_meshio(self):
         """The deformed cells as a meshio mesh of hexahedra (points in metres), with `displacement`, `fill` and columns."""
@@ -346,7 +370,7 @@ class Mapped(Shown):
         """Maps anew and writes what flexel-map writes to `path`: .stl, .obj, .ply ..., or .step of a CAD part. Raises
         InputError where that is a file that was read, unless force=True."""
         given = words({**self._options, **options})
-        heard(_flexel.map, self._body._core, given, os.fspath(path), self._files, progress=progress)
+        heard(_flexel.map, self._body._core, given, path_text(path), self._files, progress=progress)
 
     def page(self, *, progress: Progress = None) -> str:
         """The page of `flexel view` (HTML, whole)."""
@@ -397,8 +421,11 @@ class Result(Shown):
 
     @property
     def reactions(self) -> Dict[str, np.ndarray]:
-        """(3) [N] by the support on the body, by its name."""
-        return {each["name"]: np.array(each["force"]) for each in self.found["reactions"]}
+        """(3) [N] by the support on the body, by its name; of supports that share one, their sum."""
+        forces: Dict[str, np.ndarray] = {}
+        for each in self.found["reactions"]:
+            forces[each["name"]] = forces.get(each["name"], np.zeros(3)) + each["force"]
+        return forces
 
     @property
     def largest_displacement(self) -> float:

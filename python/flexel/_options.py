@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from typing import Iterable, List, Optional, Union
+
+import numpy as np
 
 from . import _flexel
 from .errors import InputError
@@ -12,29 +14,39 @@ from .errors import InputError
 _UNITS = {"push": "N", "move": "m", "torque": "N m", "twist": "rad", "bearing": "N", "probe": "m"}
 _SCALARS = {"gravity": "m/s^2", "size": "m", "edge": "m", "within": "s", "timeout": "s", "shell": "m", "tolerance": "m",
             "budget": "s"}
+_VALUED = {*_UNITS, *_SCALARS, "fix", "material", "infill", "model", "scene", "count"}
+
+
+def _float(value) -> float:
+    """What float() would make a number of all the same: True, a text, a part of a complex number."""
+    if isinstance(value, (str, bytes, bool, np.bool_)) or np.iscomplexobj(value):
+        raise TypeError(f"{value!r} is not a number")
+    return float(value)
 
 
 def _number(value) -> str:
-    return repr(float(value))
+    return repr(_float(value))
 
 
 def length(value) -> Optional[float]:
     """Metres of "2 mm" or of a number, which is metres."""
-    return _flexel.parse_quantity(value, "length") if isinstance(value, str) else None if value is None else float(value)
+    return _flexel.parse_quantity(value, "length") if isinstance(value, str) else None if value is None else _float(value)
 
 
 def _amount(value, unit: str) -> str:
     """ "0 0 -50 N" of (0, 0, -50), "5 N" of 5; a text is left as it is."""
     if isinstance(value, str):
         return value
-    try:
-        numbers = " ".join(_number(each) for each in value)
-    except TypeError:
-        numbers = _number(value)
-    return f"{numbers} {unit}"
+    if isinstance(value, (Mapping, Set, bytes, bytearray)):
+        raise TypeError(f"{value!r} is neither a number nor a vector")
+    one = not isinstance(value, Iterable) or getattr(value, "ndim", 1) == 0
+    numbers = [value] if one else list(value)
+    return f"{' '.join(_number(each) for each in numbers)} {unit}"
 
 
 def _listed(value) -> List:
+    if isinstance(value, (bytes, bytearray)):
+        raise TypeError(f"{value!r} is bytes: a text is needed")
     return [value] if isinstance(value, (str, os.PathLike)) or not isinstance(value, Iterable) else list(value)
 
 
@@ -65,6 +77,8 @@ def words(options: Mapping) -> List[str]:
         option = "--" + name.replace("_", "-")
         if value is None or value is False:
             continue
+        if value is True and name in _VALUED:
+            raise TypeError(f"{name}: True says nothing: give its value")
         if value is True:
             line.append(option)
             continue
@@ -78,6 +92,8 @@ def words(options: Mapping) -> List[str]:
             values = [_number(value)]
         elif isinstance(value, (int, float)):
             values = [str(value) if isinstance(value, int) else _number(value)]
+        elif isinstance(value, Mapping):
+            raise TypeError(f"{name}: {value!r} gives values where a name is enough")
         else:
             values = [os.fspath(each) if isinstance(each, os.PathLike) else str(each) for each in _listed(value)]
         line.extend(f"{option}={each}" for each in values)
@@ -91,8 +107,16 @@ def is_scene_text(scene) -> bool:
     return "=" in scene and not scene.endswith(".toml") and not os.path.exists(scene)
 
 
+def path(value) -> str:
+    """A path as a text. Raises ValueError where what opens it would read a part of it only."""
+    text = os.fsdecode(value)
+    if "\0" in text:
+        raise ValueError(f"{text!r} is no path: it holds a null character")
+    return text
+
+
 def paths(value) -> List[str]:
-    given = [os.fspath(each) for each in _listed(value)]
+    given = [path(each) for each in ([value] if isinstance(value, bytes) else _listed(value))]
     if not given:
         raise InputError("no file is named")
     return given

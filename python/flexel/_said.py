@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 import warnings as python_warnings
@@ -54,6 +55,8 @@ def listener(progress: Progress):
         return progress
     if progress is False:
         return None
+    if progress is not True and progress is not None:
+        raise TypeError(f"progress: {progress!r} is neither a function nor True, False or None")
     try:
         shown = sys.stderr.isatty() or _in_notebook()
     except (AttributeError, ValueError):  # no stderr, or a closed one
@@ -61,7 +64,15 @@ def listener(progress: Progress):
     return Bar() if progress is True or shown else None
 
 
-def heard(function, *arguments, progress: Progress = None, level: int = 4):
+def _warn(line: str) -> None:
+    """At the line that called the package."""
+    package, frame, level = os.path.dirname(__file__) + os.sep, sys._getframe(), 1
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(package):
+        frame, level = frame.f_back, level + 1
+    python_warnings.warn(line, FlexelWarning, stacklevel=level)
+
+
+def heard(function, *arguments, progress: Progress = None):
     """Calls `function` of the module; returns what it gives, without what it said, and that."""
     heard_by = listener(progress)
     try:
@@ -71,5 +82,5 @@ def heard(function, *arguments, progress: Progress = None, level: int = 4):
             heard_by.clear()
     *results, said = given if isinstance(given, tuple) else (given,)
     for line in said.warnings:
-        python_warnings.warn(line, FlexelWarning, stacklevel=level)
+        _warn(line)
     return (*results, said)

@@ -177,9 +177,11 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   if (near_) trial_.displacement = near_->displacement;
   trial_.share = done_ + increment_ > 1 - 1e-9 ? 1 : done_ + increment_;
   if (pushed_) push(trial_);
+  double most_gone = 0;  // a residual may rise again
   outcome_ = newton_with_links(mechanics_, trial_, options, [&](double gone, const std::string& note) {
     check_stop();
-    progress_.update(begun_ + (1 - begun_) * (done_ + gone * (trial_.share - done_)),
+    most_gone = std::max(most_gone, gone);
+    progress_.update(begun_ + (1 - begun_) * (done_ + most_gone * (trial_.share - done_)),
                      fmt::format("load {:.3g} %, {}", 100 * trial_.share, note));
   });
   if (reach_ == 0) reach_ = outcome_.first_reach / trial_.share;  // from rest: a near start moves by less

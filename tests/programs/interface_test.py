@@ -74,6 +74,7 @@ def test_bash_completes_materials_and_faces_of_the_part():
     expect("zmax" in names and any(name.endswith("/6") for name in names), names)
     offered = completions("flexel deform my\\ part.stl --fix ")
     expect(set(offered) == {name.replace(" ", "\\ ") for name in names}, offered)
+    expect(completions("flexel deform my\\ part.stl --fix part/z") == ["part/zmax", "part/zmin"], offered)
     expect(completions("flexel deform my\\ part.stl --push zm") == ["zmax", "zmin"], completions("flexel deform my\\ part.stl --push zm"))
     expect_error(run("flexel", "info", "--words", "--json", "my part.stl"), "flexel", "excludes")
     expect_error(run("flexel", "info", "--words", "--thickness", "out.ply", "my part.stl"), "flexel", "excludes")
@@ -84,50 +85,59 @@ SHELLS = {"bash": (["bash", "--norc", "--noprofile", "-i"], ". share/bash-comple
                                        "autoload -Uz compinit; compinit -u -D")}
 
 
-def expect_typed(line, *words, program="bash"):
-    """What an interactive shell has made of `line` and a tab: these words."""
-    command, preparation = SHELLS[program]
-    child, terminal = pty.fork()
-    if child == 0:
-        os.environ.update(PATH=f"{BIN}:{os.environ['PATH']}", TERM="dumb", INPUTRC="/dev/null")
-        os.execvp(command[0], command)
+class TypedShell:
+    """An interactive shell, and what it makes of a line and a tab."""
 
-    def wait_for(wanted):
+    def __init__(self, program):
+        command, preparation = SHELLS[program]
+        self.child, self.terminal = pty.fork()
+        if self.child == 0:
+            os.environ.update(PATH=f"{BIN}:{os.environ['PATH']}", TERM="dumb", INPUTRC="/dev/null")
+            os.execvp(command[0], command)
+        os.write(self.terminal, f"{preparation}; echo rea''dy\n".encode())
+
+    def __enter__(self):
+        self.wait_for(b"ready\r\n")
+        return self
+
+    def __exit__(self, *_):
+        os.kill(self.child, signal.SIGKILL)
+        os.waitpid(self.child, 0)
+        os.close(self.terminal)
+
+    def wait_for(self, wanted):
         said, until = b"", time.monotonic() + 20
         while wanted not in said:
             expect(time.monotonic() < until, f"{wanted} is missing in {said}")
-            if select.select([terminal], [], [], 0.5)[0]:
-                said += os.read(terminal, 4096)
+            if select.select([self.terminal], [], [], 0.5)[0]:
+                said += os.read(self.terminal, 4096)
 
-    try:
-        os.write(terminal, f"{preparation}; echo rea''dy\n".encode())
-        wait_for(b"ready\r\n")
-        os.write(terminal, line.encode() + b"\t")
+    def expect(self, line, *words):
+        """These words are what it has made of `line` and a tab."""
+        os.write(self.terminal, line.encode() + b"\t")
         time.sleep(0.2)
-        os.write(terminal, b"\x01printf '<%s>' \n")  # Ctrl-A: the words of the line are printed
-        wait_for("".join(f"<{word}>" for word in words).encode())
-    finally:
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
-        os.close(terminal)
+        os.write(self.terminal, b"\x01printf '<%s>' \n")  # Ctrl-A: the words of the line are printed
+        self.wait_for("".join(f"<{word}>" for word in words).encode())
 
 
 def test_an_interactive_bash_quotes_once():
     make()
-    expect_typed("flexel deform --material spri", "flexel", "deform", "--material", "spring steel")
     pathlib.Path("my part.stl").write_bytes(ascii_stl(box_triangles()))
-    expect_typed("flexel info my", "flexel", "info", "my part.stl")
+    with TypedShell("bash") as bash:
+        bash.expect("flexel deform --material spri", "flexel", "deform", "--material", "spring steel")
+        bash.expect("flexel info my", "flexel", "info", "my part.stl")
 
 
 def test_an_interactive_bash_within_quotation_marks_and_after_equals():
     """--push "zmax: 0 0 -100 N" has blanks, so that its user begins with the mark."""
     make()
     pathlib.Path("part.stl").write_bytes(ascii_stl(box_triangles()))
-    for line, word in (('flexel deform part.stl --push "zma', "zmax"), ("flexel deform part.stl --push 'zma", "zmax"),
-                       ('flexel deform part.stl --material "spri', "spring steel")):
-        expect_typed(line, "flexel", "deform", "part.stl", "--" + line.split("--")[1].split()[0], word)
-    for option, word in (("--fix=zma", "--fix=zmax"), ("--material=spri", "--material=spring steel"), ("--heal=wr", "--heal=wrap")):
-        expect_typed(f"flexel deform part.stl {option}", "flexel", "deform", "part.stl", word)
+    with TypedShell("bash") as bash:
+        for line, word in (('flexel deform part.stl --push "zma', "zmax"), ("flexel deform part.stl --push 'zma", "zmax"),
+                           ('flexel deform part.stl --material "spri', "spring steel")):
+            bash.expect(line, "flexel", "deform", "part.stl", "--" + line.split("--")[1].split()[0], word)
+        for option, word in (("--fix=zma", "--fix=zmax"), ("--material=spri", "--material=spring steel"), ("--heal=wr", "--heal=wrap")):
+            bash.expect(f"flexel deform part.stl {option}", "flexel", "deform", "part.stl", word)
 
 
 def test_bash_completes_kinds_of_files():
@@ -152,15 +162,16 @@ def test_an_interactive_zsh():
     make()
     pathlib.Path("my part.stl").write_bytes(ascii_stl(box_triangles()))
     pathlib.Path("my scene.toml").touch()
-    expect_typed("flexel deform --material spri", "flexel", "deform", "--material", "spring steel", program="zsh")
-    expect_typed("flexel info my", "flexel", "info", "my part.stl", program="zsh")
-    expect_typed("flexel deform my\\ part.stl --fix zma", "flexel", "deform", "my part.stl", "--fix", "zmax", program="zsh")
-    expect_typed("flexel deform my\\ part.stl --scene my", "flexel", "deform", "my part.stl", "--scene", "my scene.toml", program="zsh")
-    expect_typed("flexel export --mesh h", "flexel", "export", "--mesh", "hex", program="zsh")
-    expect_typed("flexel-map --method sm", "flexel-map", "--method", "smooth", program="zsh")
-    expect_typed('flexel deform my\\ part.stl --push "zma', "flexel", "deform", "my part.stl", "--push", "zmax", program="zsh")
-    for option, word in (("--fix=zma", "--fix=zmax"), ("--material=spri", "--material=spring steel"), ("--heal=wr", "--heal=wrap")):
-        expect_typed(f"flexel deform my\\ part.stl {option}", "flexel", "deform", "my part.stl", word, program="zsh")
+    with TypedShell("zsh") as zsh:
+        zsh.expect("flexel deform --material spri", "flexel", "deform", "--material", "spring steel")
+        zsh.expect("flexel info my", "flexel", "info", "my part.stl")
+        zsh.expect("flexel deform my\\ part.stl --fix zma", "flexel", "deform", "my part.stl", "--fix", "zmax")
+        zsh.expect("flexel deform my\\ part.stl --scene my", "flexel", "deform", "my part.stl", "--scene", "my scene.toml")
+        zsh.expect("flexel export --mesh h", "flexel", "export", "--mesh", "hex")
+        zsh.expect("flexel-map --method sm", "flexel-map", "--method", "smooth")
+        zsh.expect('flexel deform my\\ part.stl --push "zma', "flexel", "deform", "my part.stl", "--push", "zmax")
+        for option, word in (("--fix=zma", "--fix=zmax"), ("--material=spri", "--material=spring steel"), ("--heal=wr", "--heal=wrap")):
+            zsh.expect(f"flexel deform my\\ part.stl {option}", "flexel", "deform", "my part.stl", word)
 
 
 def offered_by_fish(line):

@@ -87,8 +87,8 @@ def test_scene_keys():
     expect_error(run("flexel", "scene-keys", "--json", "--words"), "flexel", "excludes")
 
 
-# What draws, serves or only lists where to click has nothing to print as JSON.
-WITHOUT = {"picture", "view", "clay"}
+# What draws, serves, only lists where to click, or makes a body of a body has nothing to print as JSON.
+WITHOUT = {"picture", "view", "clay", "coarsen"}
 
 
 def test_every_command_has_it_or_prints_nothing():
@@ -96,6 +96,23 @@ def test_every_command_has_it_or_prints_nothing():
     for name in (line.split("\t")[1] for line in listed):
         has = "--json" in expect_ok(run("flexel", name, "--help")).out.decode()
         expect(has == (name not in WITHOUT), f"flexel {name}: --json {has}")
+
+
+def test_every_command_prints_json_alone():
+    """A new command belongs into this table, or among those that have a test of their own above or below."""
+    box()
+    body("body.vtu")
+    elsewhere = {"study", "measure", "doctor"}
+    out = ["-o", "out.stl", "--force"]
+    commands = {"deform": ["box.stl", *PULL, *out], "flex": ["box.stl", "--bend", "10 deg", "--material", "steel", "--size", "5 mm", *out],
+                "compare": ["box.stl", "box.stl", *PULL], "compensate": ["box.stl", *PULL, *out],
+                "export": ["box.stl", *PULL, "--calculix", "-o", "out.inp"], "info": ["box.stl"], "materials": [], "scene-keys": [],
+                "voxelize": ["box.stl", "--size", "5 mm", "-o", "out.vtu"], "simulate": [scene(), "body.vtu", "-o", "out.vtu", "--force"],
+                "map": ["body.vtu", *out]}
+    listed = {line.split("\t")[1] for line in expect_ok(run("flexel", "--describe-arguments")).out.decode().splitlines()}
+    expect(listed - WITHOUT - elsewhere == set(commands), f"not in the table: {listed - WITHOUT - elsewhere ^ set(commands)}")
+    for name, arguments in commands.items():
+        expect(parsed(name, *arguments, "--json"), f"flexel {name}: nothing was found")
 
 
 def test_doctor():

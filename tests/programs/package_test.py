@@ -6,7 +6,7 @@ import re
 import shutil
 import sys
 
-from harness import BIN, SOURCE, Skip, box, expect, expect_ok, main, need, run
+from harness import BIN, SOURCE, Skip, box, expect, expect_ok, main, need, run, shell
 
 # Linked as shared libraries with interfaces of C, or tools: their packages carry their own licences.
 NOT_COMPILED_IN = {"build-essential", "cmake", "ninja-build", "zlib1g-dev", "libpng-dev", "libfreetype-dev", "libmicrohttpd-dev", "gnuplot-nox",
@@ -58,6 +58,21 @@ def test_a_release_is_of_what_is_committed():
     expect(done.code == 7 and b"checked in /" in done.out and str(pathlib.Path("tree").absolute()).encode() not in done.out.split(b"checked in")[1],
            f"{done}\n{done.out.decode()}")
     expect(not os.listdir(out), "a release of what failed its tests")
+    shutil.rmtree(out)
+    expect("the folder is missing" in refused(), "no folder")
+    # Where tests and packages succeed: stand-ins, for both take minutes. The folder is the caller's, not the tree's.
+    pathlib.Path("tree/tools/check").write_text("#!/bin/sh\n")
+    pathlib.Path("tree/tools/package").write_text("#!/bin/sh\nmkdir -p build/package; echo packed >build/package/flexel.deb\n")
+    os.chmod("tree/tools/package", 0o755)
+    pathlib.Path("tree/.gitignore").write_text("build/\n")
+    git("-C", "tree", "add", "-A")
+    git("-C", "tree", "commit", "-qm", "stand-ins")
+    expect_ok(run("tree/tools/release", "out"))
+    made = sorted(os.listdir(out))
+    expect(made[0] == "SHA256SUMS" and re.fullmatch(r"flexel-[0-9.]+\.tar\.gz", made[1]) and made[2:] == ["flexel.deb"], made)
+    expect_ok(shell("cd out && sha256sum --check --quiet --strict SHA256SUMS && tar xzf flexel-*.tar.gz"))
+    expect(len(list(out.glob("flexel-*/tools/release"))) == 1, "the source is not in its archive")
+    shutil.rmtree(out)
     pathlib.Path("tree/new").touch()
     expect("has changes" in refused(out), "a file that is not committed")
     git("-C", "tree", "add", "-A")

@@ -99,11 +99,28 @@ def test_errors_are_the_programs():
 
 def test_what_cannot_be_a_mesh():
     flexel = module()
+    import numpy as np
+
     points, quads = box()
     for vertices, faces in ((points[:, :2], quads), (points, quads * 1.0), (points, quads + 100), (points, quads[:0]),
-                            (points * float("nan"), quads)):
+                            (points * float("nan"), quads), (points + 1j, quads), (np.ma.masked_less(points, 0.001), quads),
+                            (points, np.ma.masked_greater(quads, 5)), (points, quads > 3), (points, quads.astype(np.uint64) + 2**40)):
         with check.assertRaises(flexel.InputError):
             flexel.Part.from_mesh(vertices, faces)
+
+
+def test_a_mesh_of_any_layout_is_the_same():
+    flexel = module()
+    import numpy as np
+
+    points, quads = box()
+    wanted = flexel.Part.from_mesh(points, quads)
+    doubled = np.repeat(points, 2, axis=0)
+    for vertices, faces in ((points.tolist(), quads.tolist()), (np.asfortranarray(points), np.asfortranarray(quads)),
+                            (points.astype(">f8"), quads.astype(">i8")), (doubled[::2], quads.astype(np.uint8)),
+                            (points[::-1], 7 - quads), (points.astype(object), quads)):
+        part = flexel.Part.from_mesh(vertices, faces)
+        check.assertTrue((part.vertices[part.triangles] == wanted.vertices[wanted.triangles]).all())
 
 
 def test_divergence():
@@ -139,6 +156,7 @@ def test_warnings():
         part = flexel.Part.from_mesh(points * 1e6, quads)
     check.assertTrue(part.warnings, "a part of 40 km is nothing to warn of?")
     check.assertEqual([str(each.message) for each in caught], part.warnings)
+    check.assertEqual({each.filename for each in caught}, {__file__})
     check.assertTrue(all(each.category is flexel.FlexelWarning for each in caught))
 
 
@@ -369,6 +387,123 @@ def test_values_of_the_wrong_type():
         with check.assertRaises(error) as caught:
             call()
         check.assertRegex(str(caught.exception), f"^{name}: [^\n]+$")
+
+
+def test_what_is_no_number_is_refused():
+    """float() makes something of each."""
+    flexel = module()
+    import numpy as np
+
+    part, body = flexel.Part.from_mesh(*box()), box_body(flexel)
+
+    def push(amount):
+        return lambda: flexel.simulate(body, estimate=False, **{**PULL, "push": {"xmax": amount}})
+
+    for call in (push((0, 0, "-100")), push((0, 0, -100 + 1j)), push((True, 0, 0)), push({0: 1}), push({1.0, 2.0, 3.0}), push(b"5 N"),
+                 push(np.array([0, 0, -100 + 1j])), lambda: flexel.voxelize(part, size=True), lambda: flexel.voxelize(part, size=b"2 mm"),
+                 lambda: flexel.Part.from_mesh(*box(), edge=True), lambda: flexel.simulate(body, **{**PULL, "fix": b"xmin"}),
+                 lambda: flexel.simulate(body, **{**PULL, "fix": True}), lambda: flexel.simulate(body, **{**PULL, "fix": {"xmin": 1}})):
+        with check.assertRaises(TypeError) as caught:
+            call()
+        check.assertNotIn("\n", str(caught.exception))
+    wanted = flexel.simulate(body, estimate=False, **PULL).largest_displacement
+    for amount in (np.array([0, 0, -100], np.int8), [0, 0, np.float32(-100)], (each for each in (0, 0, -100))):
+        check.assertEqual(push(amount)().largest_displacement, wanted)
+
+
+def test_what_is_of_another_class_is_named():
+    flexel = module()
+    part, body = flexel.Part.from_mesh(*box()), box_body(flexel)
+    result = flexel.simulate(body, estimate=False, **PULL)
+    for call, said in ((lambda: flexel.simulate(part, **PULL), "not a Part"), (lambda: flexel.simulate(None, **PULL), "not a NoneType"),
+                       (lambda: flexel.map(result), "give its .body"), (lambda: flexel.picture(None), "None cannot be shown"),
+                       (lambda: flexel.picture([part, "box.ply"]), "'box.ply' cannot be shown"),
+                       (lambda: flexel.voxelize(body, size=0.005), "not Body"), (lambda: flexel.voxelize(part, progress=5), "progress: 5"),
+                       (lambda: flexel.Part.from_mesh(*box(), name=5), "name: 5")):
+        with check.assertRaises(TypeError) as caught:
+            call()
+        check.assertIn(said, str(caught.exception))
+        check.assertNotIn("\n", str(caught.exception))
+    with check.assertRaises(flexel.InputError):
+        flexel.picture([])
+
+
+def test_a_path_is_read_to_its_end():
+    flexel = module()
+    part = flexel.Part.from_mesh(*box())
+    part.write("box.ply")
+    for call in (flexel.read, flexel.read_body, part.write, lambda path: flexel.picture(part, path)):
+        with check.assertRaises(ValueError) as caught:
+            call("box.ply\0.stl")
+        check.assertIn("null character", str(caught.exception))
+    check.assertTrue((flexel.read(b"box.ply", unit="m").vertices == part.vertices).all())
+
+
+def test_a_body_under_the_name_of_a_part_is_told():
+    flexel = module()
+    body = box_body(flexel)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        body.write("bent.stl")
+        body.write("bent.vtu")
+    check.assertEqual([str(each.message) for each in caught],
+                      ["bent.stl gets a body (VTK, .vtu), whatever its name says: flexel-map makes the deformed part of one"])
+    check.assertEqual(pathlib.Path("bent.stl").read_bytes(), pathlib.Path("bent.vtu").read_bytes())
+    flexel.Part.from_mesh(*box()).write("box.ply")
+    done = run("flexel-voxelize", "box.ply", "--unit", "m", "--size", "2.5 mm", "-o", "bent.stl")
+    check.assertEqual(done.code, 0)
+    check.assertIn("flexel-voxelize: warning: bent.stl gets a body", done.err)
+
+
+def test_what_timed_runs_alone_have_is_refused_elsewhere():
+    flexel = module()
+    for options in ({"isa": "portable"}, {"isa": "none such"}, {"history": "h.csv"}):
+        with check.assertRaises(flexel.InputError) as caught:
+            flexel.simulate(box_body(flexel), **options, **PULL)
+        check.assertIn("timed runs", str(caught.exception))
+
+
+def test_reactions_of_one_name_are_added():
+    flexel = module()
+    scene = 'material = "steel"\n[[fix]]\nwhere = "part/xmin"\nname = "wall"\n[[fix]]\nwhere = "part/xmax"\nname = "wall"\n[[load]]\n' \
+            'where = "zmax"\nforce = ["0 N", "0 N", "-100 N"]\n'
+    result = flexel.simulate(box_body(flexel), scene, estimate=False)
+    check.assertEqual([each["name"] for each in result.found["reactions"]], ["wall", "wall"])
+    check.assertAlmostEqual(result.reactions["wall"][2], 100, 6)
+
+
+def test_one_material_for_all():
+    flexel = module()
+    for options in ({"material": ["steel", "PLA"]}, {"material": ["part=steel", "part=PLA"]}, {"material": "PLA", "infill": ["20%", "40%"]}):
+        with check.assertRaises(flexel.InputError) as caught:
+            flexel.simulate(box_body(flexel), **{**PULL, **options})
+        check.assertIn("is given twice", str(caught.exception))
+    both = flexel.simulate(box_body(flexel), **{**PULL, "material": ["steel", "part=PLA"]}, estimate=False)
+    alone = flexel.simulate(box_body(flexel), **{**PULL, "material": "PLA"}, estimate=False)
+    check.assertEqual(both.largest_displacement, alone.largest_displacement)
+
+
+def test_meshio_meshes_are_taken_whole():
+    """Triangles beside quads, in the order of the mesh; nothing is left out without a word."""
+    flexel = module()
+    try:
+        import meshio
+    except ImportError:
+        from harness import Skip
+
+        raise Skip("meshio is not installed") from None
+    points, quads = box()
+    halves = [[corners[0], *corners[n : n + 2]] for corners in quads[2:4] for n in (1, 2)]
+    cells = [("quad", quads[:2]), ("vertex", [[0]]), ("triangle", halves), ("quad", quads[4:])]
+    part = flexel.Part.from_meshio(meshio.Mesh(points, cells))
+    whole = flexel.Part.from_mesh(points, quads)
+    check.assertTrue((part.triangles == whole.triangles).all())
+    check.assertEqual([len(each) for each in (part.polygons[0], part.faces)], [9, 6])
+    curved = meshio.Mesh(points, [("triangle", halves), ("triangle6", [[0, 1, 2, 3, 4, 5]])])
+    for mesh, said in ((curved, "triangle6"), (meshio.Mesh(points, [("tetra", [[0, 1, 2, 4]])]), "extract its surface")):
+        with check.assertRaises(flexel.InputError) as caught:
+            flexel.Part.from_meshio(mesh)
+        check.assertIn(said, str(caught.exception))
 
 
 def test_meshio_round_trip():

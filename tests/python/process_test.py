@@ -235,6 +235,65 @@ def test_progress_of_cad_files():
     check.assertEqual(shares, sorted(shares))
 
 
+def test_progress_of_each_stage():
+    """Deep within a stage it is told how far it is: of a wrap, of a lattice, of a map and its checks, of a CAD file's triangles."""
+    flexel = module()
+    need_step()
+    bracket()
+    part = flexel.Part.from_mesh(*box(), edge=0.00015)
+    seen = {}
+
+    def hear(name):
+        return lambda stage, share, note, left: seen.setdefault((name, stage), []).append(share)
+
+    flexel.read("bracket.step", deflection="0.3 um", edge="1 m", progress=hear("cad"))
+    flexel.voxelize(flexel.Part.from_mesh(*box()), size=0.001, heal="wrap:0.35 mm", progress=hear("wrap"))
+    flexel.voxelize(part, size=0.00025, progress=hear("lattice"))
+    bent = flexel.simulate(flexel.voxelize(part, size=0.0025), estimate=False, **PULL).body
+    flexel.map(bent, check="self-intersection", progress=hear("map"))
+    for key in (("cad", "import"), ("wrap", "heal"), ("lattice", "voxelize"), ("map", "map")):
+        check.assertTrue(any(0 < share < 1 for share in seen[key]), f"{key}: {seen[key]}")
+        check.assertEqual(seen[key], sorted(seen[key]), f"{key}")
+
+
+def told_by_a_fork(work):
+    """What `work` returns in a child of this process."""
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        signal.alarm(30)  # a child that waits for ever says nothing
+        os.write(writer, str(work()).encode())
+        os._exit(0)
+    os.close(writer)
+    with open(reader, "rb") as said:
+        text = said.read().decode()
+    os.waitpid(child, 0)
+    return text
+
+
+def test_a_fork_between_runs_runs():
+    flexel = module()
+    body = box_body(flexel)
+    found = flexel.simulate(body, estimate=False, **PULL).largest_displacement
+    check.assertEqual(told_by_a_fork(lambda: flexel.simulate(body, estimate=False, **PULL).largest_displacement), str(found))
+
+
+def test_a_fork_within_a_run_is_refused():
+    """Whatever the run held then is held for ever in the child."""
+    flexel = module()
+    body, part, said = box_body(flexel), flexel.Part.from_mesh(*box()), []
+
+    def refused():
+        try:
+            return flexel.voxelize(part, size=0.005)
+        except flexel.InputError as error:
+            return error
+
+    flexel.simulate(body, SWING.replace("TIME", "0.1 ms"), on_frame=lambda frame: said or said.append(told_by_a_fork(refused)))
+    check.assertIn("forked while a run went on", said[0])
+    check.assertEqual(len(refused().rest), 9 * 3 * 3)
+
+
 def test_nothing_on_stderr_without_a_terminal():
     module()
     code = ("import sys\nsys.path.insert(0, %r)\nimport flexel, shared\n"

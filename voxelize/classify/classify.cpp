@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "base/parallel.h"
+#include "base/program/share_scope.h"
 #include "voxelize/classify/moments.h"
 #include "voxelize/classify/overlap.h"
 #include "voxelize/classify/pieces.h"
@@ -238,12 +239,14 @@ Voxels classify_closed(const PartMesh& mesh, const ClassifyOptions& options) {
   Voxels voxels;
   voxels.k_begin = bins.k_begin;
   voxels.slabs.resize(bins.begin.size() - 1);
+  ShareCounter done(voxels.slabs.size());
   parallel_chunks(voxels.slabs.size(), 2, [&](std::size_t begin, std::size_t end) {
     SlabBuilder builder(mesh, options);
     for (std::size_t s = begin; s < end; ++s)
       builder.build(bins.k_begin + static_cast<int>(s),
                     {bins.triangles.data() + bins.begin[s], bins.begin[s + 1] - bins.begin[s]},
                     voxels.slabs[s]);
+    done.add(end - begin);
   });
   number_pieces(voxels);
   return voxels;

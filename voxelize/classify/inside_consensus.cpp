@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "base/parallel.h"
+#include "base/program/share_scope.h"
 #include "voxelize/classify/assign_polygons.h"
 #include "voxelize/classify/axis_parity.h"
 #include "voxelize/classify/sample_distances.h"
@@ -177,8 +178,11 @@ VoxelSamples decided(const Judges& judges, const Verdict& verdict, int i, int j,
 
 Sampled classify_sampled(const PartMesh& mesh, bool unanimous) {
   const Judges judges(mesh);
+  constexpr double kJudgesThere = .4, kDecided = .7;  // of the time
+  tell_share(kJudgesThere);
   Sampled result;
   result.agreement = agreement(judges, kJudged);
+  tell_share(kDecided);
   Verdict verdict{decide(result.agreement, unanimous), &judges, 1};
   std::optional<PartMesh> fine;
   std::optional<Judges> finer;
