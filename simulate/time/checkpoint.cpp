@@ -27,7 +27,7 @@ namespace flexel::simulate {
 namespace {
 
 constexpr char kMagic[8] = {'f', 'l', 'e', 'x', 'e', 'l', 'C', 'P'};
-constexpr std::uint64_t kVersion = 8;
+constexpr std::uint64_t kVersion = 9;
 
 struct Head {
   char magic[8];
