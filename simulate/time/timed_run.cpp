@@ -116,7 +116,6 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
                     contact.parting, duration_));
   start_.settled = settled_displacement(body);
   start_.fused = fused_points(body);
-  start_.bonding_parts = body.parts.size();
   if (!options.series.empty()) series_.emplace(options.series, options.compress);
   if (!options.checkpoint.empty()) {
     kept_.emplace();
@@ -164,7 +163,7 @@ void TimedRun::begin() {
 
 void TimedRun::resume(const Checkpoint& from) {
   clock_ = from.clock;
-  start_ = {false, from.settled, from.fused, from.bonding_parts};
+  start_ = {false, from.settled, from.fused};
   events_ = std::min<std::size_t>(from.events, scene_.events.size());
   segment_.emplace(body_, scene_, options_, progress_, start_, from.state);
   segment_->restore(from.memory);
@@ -190,7 +189,6 @@ void TimedRun::keep() {
   kept_->events = events_;
   kept_->settled = start_.settled;
   kept_->fused = start_.fused;
-  kept_->bonding_parts = start_.bonding_parts;
   if (history_) kept_->ledger = history_->ledger();
   if (series_) kept_->frames = series_->place();
   kept_->next_row = next_row_;
