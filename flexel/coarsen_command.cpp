@@ -32,7 +32,7 @@ Body coarser_cells(const Body& body) {
   return coarse;
 }
 
-Body coarser(const Body& body, const std::string& path) {
+Body coarser_body(const Body& body, const std::string& path) {
   try {
     return body.parts.front().placement == Placement::centre ? simulate::merged_elements(body)
                                                              : coarser_cells(body);
@@ -74,7 +74,7 @@ int coarsen_command(int argc, char** argv) {
   if (body.parts.empty() || body.element_count() == 0)
     throw InputError(input == "-" ? "stdin" : input, "the body has no elements");
   const std::string before = elements_of(body);
-  for (int n = 0; n < times; ++n) body = coarser(body, input == "-" ? "stdin" : input);
+  for (int n = 0; n < times; ++n) body = coarser_body(body, input == "-" ? "stdin" : input);
   progress.say(fmt::format("{} became {}", before, elements_of(body)));
   write_body(body, output, {.compress = compress});
   progress.finish();

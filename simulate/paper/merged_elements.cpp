@@ -16,7 +16,7 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr std::size_t kDirections = half_neighbourhood.size();
+constexpr std::size_t kDirectionBits = half_neighbourhood.size();
 constexpr double kEightElements = 8;
 
 // How numbers of elements or connections become one.
@@ -66,7 +66,7 @@ void refuse_unknown(const Body& body) {
   refuse_damaged_columns(body);
 }
 
-std::int32_t half(std::int32_t index) {
+std::int32_t half_index(std::int32_t index) {
   return index >= 0 ? index / 2 : -((1 - index) / 2);
 }
 
@@ -110,9 +110,9 @@ class MergedElements {
                                                        std::span<const double> values) const;
 
   const Body& fine_;
-  std::vector<std::array<std::uint32_t, kDirections>> neighbour_;  // (elements) by bit; kNoElement
-  std::vector<std::uint32_t> group_;                               // (elements) coarse element
-  std::vector<double> mass_, stiffness_;                           // (elements) factors
+  std::vector<std::array<std::uint32_t, kDirectionBits>> neighbour_;  // (elements) by bit; kNoElement
+  std::vector<std::uint32_t> group_;                                  // (elements) coarse element
+  std::vector<double> mass_, stiffness_;                              // (elements) factors
   Body coarse_;
   static constexpr std::uint32_t kNoElement = ~0u;
 };
@@ -129,7 +129,7 @@ MergedElements::MergedElements(const Body& fine)
 
 // The other ends of what Body::connections has.
 void MergedElements::connect() {
-  std::array<std::uint32_t, kDirections> none;
+  std::array<std::uint32_t, kDirectionBits> none;
   none.fill(kNoElement);
   neighbour_.assign(fine_.element_count(), none);
   for (const Part& part : fine_.parts) {
@@ -137,7 +137,7 @@ void MergedElements::connect() {
     for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
       at[{fine_.lattice_index[e], fine_.piece[e]}] = e;
     for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
-      for (std::size_t bit = 0; bit < kDirections; ++bit) {
+      for (std::size_t bit = 0; bit < kDirectionBits; ++bit) {
         if (!(fine_.connections[e] >> bit & 1u)) continue;
         Index3 other = fine_.lattice_index[e];
         for (std::size_t axis = 0; axis < 3; ++axis) other[axis] += half_neighbourhood[bit][axis];
@@ -182,8 +182,8 @@ void MergedElements::group(const Part& part) {
   const auto place = [&](std::uint32_t e) {
     std::array<std::int32_t, 3> at;
     for (std::size_t axis = 0; axis < 3; ++axis)
-      at[axis] = half(fine_.lattice_index[e][axis] -
-                      static_cast<std::int32_t>(low[static_cast<Eigen::Index>(axis)]));
+      at[axis] = half_index(fine_.lattice_index[e][axis] -
+                            static_cast<std::int32_t>(low[static_cast<Eigen::Index>(axis)]));
     return std::tuple(at[2], at[1], at[0], fine_.piece[e]);
   };
   for (std::uint32_t e = part.element_begin; e < part.element_end; ++e) number[place(e)] = 0;
@@ -247,7 +247,7 @@ std::pair<std::uint32_t, std::size_t> MergedElements::place_of(std::uint32_t a, 
     return static_cast<std::size_t>(std::find(half_neighbourhood.begin(), half_neighbourhood.end(), way) -
                                     half_neighbourhood.begin());
   };
-  if (const std::size_t bit = find(step); bit < kDirections) return {a, bit};
+  if (const std::size_t bit = find(step); bit < kDirectionBits) return {a, bit};
   return {b, find({-step[0], -step[1], -step[2]})};
 }
 
@@ -261,34 +261,34 @@ void MergedElements::merge_connections() {
     }
   for (const MergedColumn& column : kOfConnections)
     if (const std::span<const double> values = connection_values(fine_, column.name); !values.empty())
-      coarse_.element_columns[column.name] = {static_cast<int>(kDirections),
+      coarse_.element_columns[column.name] = {static_cast<int>(kDirectionBits),
                                               merged_connections(column, values)};
 }
 
 // By the coarse elements that have the bits.
 std::vector<double> MergedElements::merged_connections(const MergedColumn& column,
                                                        std::span<const double> values) const {
-  std::vector<std::array<MergedValue, kDirections>> within(coarse_.element_count()),
+  std::vector<std::array<MergedValue, kDirectionBits>> within(coarse_.element_count()),
       across(coarse_.element_count());
   const double one = column.is_factor ? 1 : 0;
   for (std::uint32_t e = 0; e < fine_.element_count(); ++e)
-    for (std::size_t bit = 0; bit < kDirections; ++bit) {
+    for (std::size_t bit = 0; bit < kDirectionBits; ++bit) {
       if (neighbour_[e][bit] == kNoElement) continue;
-      const double value = one + values[kDirections * e + bit];
+      const double value = one + values[kDirectionBits * e + bit];
       const std::uint32_t own = group_[e], other = group_[neighbour_[e][bit]];
       if (own == other)
         within[own][bit].add(column.how, 0.5, value);
       else if (place_of(own, other) == std::pair{own, bit})
         across[own][bit].add(column.how, 1, value);
     }
-  std::vector<double> merged(kDirections * coarse_.element_count(), 0);
+  std::vector<double> merged(kDirectionBits * coarse_.element_count(), 0);
   std::map<Index3, std::vector<std::uint32_t>> at;  // by part below
   for (const Part& part : coarse_.parts) {
     at.clear();
     for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
       at[coarse_.lattice_index[e]].push_back(e);
     for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
-      for (std::size_t bit = 0; bit < kDirections; ++bit) {
+      for (std::size_t bit = 0; bit < kDirectionBits; ++bit) {
         if (!(coarse_.connections[e] >> bit & 1u)) continue;
         MergedValue value = across[e][bit];
         value.add(within[e][bit]);
@@ -296,7 +296,7 @@ std::vector<double> MergedElements::merged_connections(const MergedColumn& colum
         for (std::size_t axis = 0; axis < 3; ++axis) next[axis] += half_neighbourhood[bit][axis];
         for (const std::uint32_t other : at[next])
           if (coarse_.piece[other] == coarse_.piece[e]) value.add(within[other][bit]);
-        if (value.weight > 0) merged[kDirections * e + bit] = value.value(column.how) - one;
+        if (value.weight > 0) merged[kDirectionBits * e + bit] = value.value(column.how) - one;
       }
   }
   return merged;

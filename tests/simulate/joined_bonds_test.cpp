@@ -31,29 +31,29 @@ Body right_half() {
       {.cells = {6, 3, 3}, .spacing = Vec3::Constant(2e-2 / 3), .origin = Vec3(4e-2, 0, 0), .name = "right"});
 }
 
-Scene scene_of(const std::string& keys) {
+Scene late_gum_scene(const std::string& keys) {
   return parse_scene("material = \"gum\"\n" + keys +
                          "\n[materials.gum]\nyoung = \"1 MPa\"\npoisson = 0.25\ndensity = \"1000 kg/m3\"\n",
                      "scene.toml");
 }
 
-std::string add_at(const std::string& at, const std::string& path) {
+std::string late_add_at(const std::string& at, const std::string& path) {
   return "\n[[event]]\nat = \"" + at + "\"\ndo = \"add\"\nbody = \"" + path + "\"\n";
 }
 
 // Turned by a right angle about z, and drawn along.
-Body turned(Body body, const Vec3& along) {
+Body turned_along(Body body, const Vec3& along) {
   for (Vec3& x : body.position) x = Vec3(-x.y(), x.x(), x.z()) + along;
   return body;
 }
 
-std::vector<Vec3> displacements(const Body& body) {
+std::vector<Vec3> moves_of(const Body& body) {
   std::vector<Vec3> moved;
   for (std::size_t e = 0; e < body.element_count(); ++e) moved.push_back(body.position[e] - body.rest[e]);
   return moved;
 }
 
-double largest(const std::vector<Vec3>& vectors) {
+double largest_of_moves(const std::vector<Vec3>& vectors) {
   double most = 0;
   for (const Vec3& each : vectors) most = std::max(most, each.norm());
   return most;
@@ -70,8 +70,9 @@ TEST(JoinedBonds, APartThatComesAtOnceIsBondedAsOneThatWasThere) {
                              "\"\n[run]\ntime = \"30 ms\"\n[[fix]]\nwhere = \"left/x0\"\n[[load]]\nwhere = "
                              "\"right/x1\"\nforce = [0, 0, \"0.02 N\"]\n[[probe]]\nname = \"end\"\nwhere = "
                              "\"right/x1\"\n";
-    const TimedCase there = run_timed(both, scene_of(keys));
-    const TimedCase came = run_timed(left, scene_of(keys + add_at("0 s", scratch.path("right.vtu"))));
+    const TimedCase there = run_timed(both, late_gum_scene(keys));
+    const TimedCase came =
+        run_timed(left, late_gum_scene(keys + late_add_at("0 s", scratch.path("right.vtu"))));
     expect_books_close(came.result);
     const auto farthest = [](const TimedCase& run) {
       const std::vector<double>& end = run.history.column("end z");
@@ -99,22 +100,23 @@ TEST(JoinedBonds, APartThatComesAtOnceIsBondedAsOneThatWasThere) {
 TEST(JoinedBonds, TheyTouchWhereTheyAreThen) {
   const flexel::test::Scratch scratch;
   Body right = right_half();
-  const Body left = turned(left_half(), Vec3(0.5, 0, 0));
-  right = turned(std::move(right), Vec3(0.5, 0, 0));
+  const Body left = turned_along(left_half(), Vec3(0.5, 0, 0));
+  right = turned_along(std::move(right), Vec3(0.5, 0, 0));
   write_body(right, scratch.path("right.vtu"));
-  const TimedCase still =
-      run_timed(left, scene_of("[run]\ntime = \"20 ms\"" + add_at("1 ms", scratch.path("right.vtu"))));
+  const TimedCase still = run_timed(
+      left, late_gum_scene("[run]\ntime = \"20 ms\"" + late_add_at("1 ms", scratch.path("right.vtu"))));
   Body both = left;
   append(both, right);
-  std::vector<Vec3> moved = displacements(still.body);
+  std::vector<Vec3> moved = moves_of(still.body);
   for (std::size_t e = 0; e < moved.size(); ++e) moved[e] -= both.position[e] - both.rest[e];
-  EXPECT_LT(largest(moved), 1e-12);
+  EXPECT_LT(largest_of_moves(moved), 1e-12);
   EXPECT_FALSE(fused_points(still.body).empty());
   // thrown: the other half is drawn along, with momentum and angular momentum kept
   Body thrown = left;
   testing::set_velocity(thrown, std::vector<Vec3>(thrown.element_count(), Vec3(0, 0.1, 0)));
-  const TimedCase flown = run_timed(thrown, scene_of("[damping]\ntime = \"2 ms\"\n[run]\ntime = \"300 ms\"" +
-                                                     add_at("0 s", scratch.path("right.vtu"))));
+  const TimedCase flown =
+      run_timed(thrown, late_gum_scene("[damping]\ntime = \"2 ms\"\n[run]\ntime = \"300 ms\"" +
+                                       late_add_at("0 s", scratch.path("right.vtu"))));
   testing::expect_momenta_kept(flown.history, 1e-9);
   double speed = 0;
   const Part& part = flown.body.parts[1];
@@ -133,22 +135,23 @@ TEST(JoinedBonds, WhatTouchesAtRestOnlyStaysApart) {
   for (Vec3& x : left.position) x.x() -= 5e-3;
   testing::set_velocity(left, std::vector<Vec3>(left.element_count(), Vec3(-1, 0, 0)));
   const std::string run = "[run]\ntime = \"10 ms\"\n";
-  const TimedCase first = run_timed(left, scene_of(run + add_at("0 s", scratch.path("right.vtu"))));
+  const TimedCase first =
+      run_timed(left, late_gum_scene(run + late_add_at("0 s", scratch.path("right.vtu"))));
   EXPECT_TRUE(fused_points(first.body).empty());
-  const TimedCase second = run_timed(first.body, scene_of(run));
+  const TimedCase second = run_timed(first.body, late_gum_scene(run));
   for (std::uint32_t e = second.body.parts[1].element_begin; e < second.body.element_count(); ++e)
     ASSERT_EQ(second.body.position[e], second.body.rest[e]);
   const std::string named = "[[bond]]\nparts = [\"left\", \"right\"]\n";
   const auto refusal = [&](const Body& body, const std::string& keys) -> std::string {
     try {
-      (void)run_timed(body, scene_of(keys));
+      (void)run_timed(body, late_gum_scene(keys));
     } catch (const InputError& error) {
       return error.what();
     }
     return "accepted";
   };
   EXPECT_THAT(refusal(first.body, run + named), HasSubstr("joined in an earlier run"));
-  EXPECT_THAT(refusal(left, run + named + add_at("0 s", scratch.path("right.vtu"))),
+  EXPECT_THAT(refusal(left, run + named + late_add_at("0 s", scratch.path("right.vtu"))),
               HasSubstr("do not touch"));
 }
 
@@ -162,10 +165,10 @@ TEST(JoinedBonds, LaterRunsGoOnWithThem) {
                "[[probe]]\nname = \"end\"\nwhere = \"right/x1\"\n[run]\ntime = \"") +
            time + "\"\n";
   };
-  const std::string add = add_at("0 s", scratch.path("right.vtu"));
-  const TimedCase whole = run_timed(left_half(), scene_of(keys("30 ms") + add));
-  const TimedCase first = run_timed(left_half(), scene_of(keys("15 ms") + add));
-  const TimedCase second = run_timed(first.body, scene_of(keys("15 ms")));
+  const std::string add = late_add_at("0 s", scratch.path("right.vtu"));
+  const TimedCase whole = run_timed(left_half(), late_gum_scene(keys("30 ms") + add));
+  const TimedCase first = run_timed(left_half(), late_gum_scene(keys("15 ms") + add));
+  const TimedCase second = run_timed(first.body, late_gum_scene(keys("15 ms")));
   EXPECT_EQ(fused_points(second.body).size(), fused_points(first.body).size());
   const double wanted = whole.result.probes.at(0).displacement.z();
   EXPECT_NEAR(second.result.probes.at(0).displacement.z(), wanted, 0.01 * wanted);
@@ -178,11 +181,11 @@ TEST(JoinedBonds, ABondNamesAPartThatComes) {
   for (Vec3& x : right.position) x.x() += 1e-3;
   write_body(right, scratch.path("right.vtu"));
   const std::string run = "contact = true\n[run]\ntime = \"5 ms\"\n";
-  const std::string add = add_at("1 ms", scratch.path("right.vtu"));
-  const TimedCase apart = run_timed(left_half(), scene_of(run + add));
+  const std::string add = late_add_at("1 ms", scratch.path("right.vtu"));
+  const TimedCase apart = run_timed(left_half(), late_gum_scene(run + add));
   EXPECT_TRUE(fused_points(apart.body).empty()) << "with contact nothing is bonded that is not named";
   const TimedCase made = run_timed(
-      left_half(), scene_of(run + "[[bond]]\nparts = [\"left\", \"right\"]\ngap = \"2 mm\"\n" + add));
+      left_half(), late_gum_scene(run + "[[bond]]\nparts = [\"left\", \"right\"]\ngap = \"2 mm\"\n" + add));
   EXPECT_FALSE(fused_points(made.body).empty());
 }
 
@@ -194,10 +197,11 @@ TEST(JoinedBonds, AProbeSelectsAPartThatComes) {
   write_body(right, scratch.path("right.vtu"));
   const TimedCase made = run_timed(
       left_half(),
-      scene_of("[[probe]]\nname = \"late\"\nwhere = \"right/x1\"\n[[probe]]\nname = \"all\"\nwhere = "
-               "[\"left/x1\", \"right/x1\"]\n[run]\ntime = \"4 ms\"\n[gravity]\nacceleration = [0, 0, \"-10 "
-               "m/s2\"]\n" +
-               add_at("2 ms", scratch.path("right.vtu"))));
+      late_gum_scene(
+          "[[probe]]\nname = \"late\"\nwhere = \"right/x1\"\n[[probe]]\nname = \"all\"\nwhere = "
+          "[\"left/x1\", \"right/x1\"]\n[run]\ntime = \"4 ms\"\n[gravity]\nacceleration = [0, 0, \"-10 "
+          "m/s2\"]\n" +
+          late_add_at("2 ms", scratch.path("right.vtu"))));
   const std::vector<double>&time = made.history.column("time"), &late = made.history.column("late x"),
         &all = made.history.column("all x");
   std::size_t before = 0;
@@ -214,10 +218,10 @@ TEST(JoinedBonds, AProbeSelectsAPartThatComes) {
   EXPECT_GT(before, 1u);
   EXPECT_NEAR(made.result.probes.at(0).displacement.x(), 0.1, 1e-9);
   EXPECT_NEAR(made.result.probes.at(1).displacement.x(), 0.05, 1e-6);
-  EXPECT_THROW(
-      (void)run_timed(left_half(), scene_of("[[probe]]\nwhere = \"rihgt/x1\"\n[run]\ntime = \"4 ms\"\n" +
-                                            add_at("2 ms", scratch.path("right.vtu")))),
-      InputError);
+  EXPECT_THROW((void)run_timed(left_half(),
+                               late_gum_scene("[[probe]]\nwhere = \"rihgt/x1\"\n[run]\ntime = \"4 ms\"\n" +
+                                              late_add_at("2 ms", scratch.path("right.vtu")))),
+               InputError);
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ using testing::CentreOptions;
 using ::testing::HasSubstr;
 
 // An odd box with elements missing, factors on everything, moved and moving.
-Body some_body() {
+Body unlike_body() {
   CentreOptions options;
   options.voxels = {7, 4, 5};
   options.spacing = 1e-2;
@@ -40,14 +40,14 @@ Body some_body() {
   return body;
 }
 
-struct Momentum {
+struct MergedMomentum {
   double mass = 0;
   Vec3 of = Vec3::Zero(), place = Vec3::Zero();  // sums of m v, of m u
 };
-Momentum momentum(const Body& body) {
+MergedMomentum merged_momentum(const Body& body) {
   const Problem problem = testing::problem_of(body, testing::kCauchyGum, Model::paper);
   const std::vector<double> mass = lumped_masses(problem);
-  Momentum sum;
+  MergedMomentum sum;
   for (std::size_t e = 0; e < mass.size(); ++e) {
     sum.mass += mass[e];
     sum.of += mass[e] * Eigen::Map<const Vec3>(&body.element_columns.at("velocity").values[3 * e]);
@@ -57,9 +57,9 @@ Momentum momentum(const Body& body) {
 }
 
 TEST(MergedElements, MassMomentumAndMeanMotionAreThose) {
-  const Body fine = some_body(), coarse = merged_elements(fine);
+  const Body fine = unlike_body(), coarse = merged_elements(fine);
   EXPECT_LT(coarse.element_count(), fine.element_count() / 4);
-  const Momentum before = momentum(fine), after = momentum(coarse);
+  const MergedMomentum before = merged_momentum(fine), after = merged_momentum(coarse);
   EXPECT_NEAR(after.mass, before.mass, 1e-14 * before.mass);
   EXPECT_LT((after.of - before.of).norm(), 1e-14 * before.mass);
   EXPECT_LT((after.place - before.place).norm(), 1e-16 * before.mass);
@@ -67,7 +67,7 @@ TEST(MergedElements, MassMomentumAndMeanMotionAreThose) {
 
 // Every element within its coarse one, whatever the lowest index.
 TEST(MergedElements, ElementsRestInTheMiddleOfTheirGroup) {
-  Body fine = some_body();
+  Body fine = unlike_body();
   for (Index3& at : fine.lattice_index) at[1] -= 3;
   fine.parts[0].lattice.origin += 3 * fine.parts[0].lattice.spacing.y() * fine.parts[0].lattice.axes.col(1);
   const Body coarse = merged_elements(fine);
