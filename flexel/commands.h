@@ -4,6 +4,7 @@
 namespace flexel::commands {
 
 int clay_command(int argc, char** argv);
+int coarsen_command(int argc, char** argv);
 int compare_command(int argc, char** argv);
 int compensate_command(int argc, char** argv);
 int deform_command(int argc, char** argv);

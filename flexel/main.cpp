@@ -45,6 +45,8 @@ constexpr const char* kHelp =
     "  flexel scene-keys     the keys of scenes: where each may stand, what it takes, its default\n"
     "  flexel measure --model NAME --size LENGTH\n"
     "                        what the lattice makes of a material: E, nu and G by direction and resolution\n"
+    "  flexel coarsen BODY -o OUT.vtu\n"
+    "                        the same body with each 2 x 2 x 2 elements as one\n"
     "  flexel study PART... --scene FILE -o FOLDER\n"
     "                        what accuracy costs in time: a page with plots and the size to use\n"
     "  flexel doctor         what is installed, and a short run whose answer is known\n"
@@ -81,6 +83,7 @@ constexpr Command kCommands[] = {{"deform", deform_command},
                                  {"materials", materials_command},
                                  {"scene-keys", scene_keys_command},
                                  {"measure", measure_command},
+                                 {"coarsen", coarsen_command},
                                  {"study", study_command},
                                  {"doctor", doctor_command}};
 constexpr const char* kStages[] = {"voxelize", "simulate", "map"};

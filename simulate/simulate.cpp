@@ -21,6 +21,7 @@
 #include "formats/lattice/quadratic_field.h"
 #include "simulate/conduction/conduction.h"
 #include "simulate/contact/pairs/stuck_places.h"
+#include "simulate/effects/bonds.h"
 #include "simulate/effects/contact.h"
 #include "simulate/equilibrium/equilibrium.h"
 #include "simulate/equilibrium/equilibrium_problem.h"
@@ -444,7 +445,9 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   body.cell_columns.erase(kFreeStrainColumn);  // a run's own
   progress.stage("simulate");
   drop_stuck_places(body, scene, progress);
-  check_actions(scene.events.empty() ? scene : at_the_beginning(scene, body), body, progress);
+  const Scene first = scene.events.empty() ? scene : at_the_beginning(scene, body);
+  check_actions(first, body, progress);
+  if (!options.resume) Bonds::refuse_joined_apart(first.get<Bonds>(), body);
   refuse_heat(scene);
   refuse_beyond_memory(body, scene);
   if (options.explain) explain_memory(body, scene, progress);

@@ -1,6 +1,7 @@
 // study.csv, study.json and the table of predictions. docs/guide/study.md gives every column.
 #include <fmt/format.h>
 
+#include "base/files/csv.h"
 #include "base/json.h"
 #include "base/units.h"
 #include "flexel/study/study.h"
@@ -10,14 +11,6 @@ namespace flexel::study {
 namespace {
 
 using OrderedJson = nlohmann::ordered_json;
-
-// Commas and quotes in names, as RFC 4180 has it.
-std::string quoted(const std::string& text) {
-  if (text.find_first_of(",\"\n") == std::string::npos) return text;
-  std::string out = "\"";
-  for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return out + "\"";
-}
 
 std::string number(double value) {
   return fmt::format("{:.9g}", value);
@@ -130,13 +123,13 @@ OrderedJson json_of(const Against& against) {
 
 std::string csv_header(const std::vector<Quantity>& quantities) {
   std::vector<std::string> names;
-  for (const Field& field : fields(0, {}, quantities)) names.push_back(quoted(field.name));
+  for (const Field& field : fields(0, {}, quantities)) names.push_back(csv_field(field.name));
   return fmt::format("{}\n", fmt::join(names, ","));
 }
 
 std::string csv_line(std::size_t run, const Row& row, const std::vector<Quantity>& quantities) {
   std::vector<std::string> values;
-  for (const Field& field : fields(run, row, quantities)) values.push_back(quoted(field.value));
+  for (const Field& field : fields(run, row, quantities)) values.push_back(csv_field(field.value));
   return fmt::format("{}\n", fmt::join(values, ","));
 }
 

@@ -35,7 +35,8 @@ void append_all(std::vector<T>& all, const std::vector<T>& more) {
 }
 
 // Notes whose lines name parts by their numbers, at these places among what blanks separate.
-const std::map<std::string, std::set<std::size_t>> kNotesOfParts = {{"carved", {0}}, {"stuck", {0, 7}}};
+const std::map<std::string, std::set<std::size_t>> kNotesOfParts = {
+    {"carved", {0}}, {"joined", {0}}, {"stuck", {0, 7}}};
 
 // `note`, with parts numbered from `first` on. What is no number of a part stays: -1, or what is damaged.
 std::string with_parts_from(const std::string& note, const std::set<std::size_t>& places, std::size_t first) {

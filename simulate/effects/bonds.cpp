@@ -9,8 +9,10 @@
 #include <map>
 
 #include "base/error.h"
+#include "formats/lattice/fused_points.h"
 #include "simulate/effects/contact.h"
 #include "simulate/input/part_names.h"
+#include "simulate/matter/joined_parts.h"
 #include "simulate/matter/masses.h"
 #include "simulate/models/stability.h"
 
@@ -144,6 +146,29 @@ void Bonds::refuse_apart(const Named& named) {
                   named.parts[0], named.parts[1], named.gap > 0 ? " over its gap" : "; give a \"gap\""));
 }
 
+void Bonds::refuse_joined_apart(const Parameters& parameters, const Body& body) {
+  if (parameters.named.empty() || !body.notes.contains(kJoinedNote)) return;
+  const std::vector<std::uint8_t> joined = joined_parts(body);
+  const std::vector<TouchingGap> named = named_gaps(parameters, body);
+  const std::vector<FusedPoint> fused = fused_points(body);
+  for (std::size_t n = 0; n < named.size(); ++n) {
+    const auto is_of = [&](const FusedPoint& point, std::uint32_t number) {
+      const Part& part = body.parts[number];
+      return std::any_of(point.elements.begin(), point.elements.end(),
+                         [&](std::uint32_t e) { return e >= part.element_begin && e < part.element_end; });
+    };
+    const auto& [a, b] = named[n].parts;
+    if (!joined[a] && !joined[b]) continue;
+    if (std::none_of(fused.begin(), fused.end(),
+                     [&](const FusedPoint& point) { return is_of(point, a) && is_of(point, b); }))
+      throw InputError(
+          parameters.named[n].origin,
+          fmt::format("parts \"{}\" and \"{}\" of a [[bond]]: one joined in an earlier run, and did not "
+                      "touch the other then; an [[event]] with do = \"fuse\" holds them together",
+                      parameters.named[n].parts[0], parameters.named[n].parts[1]));
+  }
+}
+
 std::optional<Bonds> Bonds::make(const Parameters& parameters, const Problem& problem) {
   if (!parameters.bond && parameters.named.empty()) return std::nullopt;
   const std::vector<TouchingGap> named = named_gaps(parameters, problem.body);
@@ -156,10 +181,9 @@ std::optional<Bonds> Bonds::make(const Parameters& parameters, const Problem& pr
   using Matrix = decltype(BondedElements::stiffness);
   std::map<std::vector<std::uint32_t>, Matrix> by_elements;
   std::map<std::array<std::uint32_t, 2>, double> area;
+  const std::vector<std::uint8_t> joined = joined_parts(problem.body);
   for_each_touching_point(problem, named, [&](const TouchingPoint& point) {
-    if (!is_named(point.part) &&
-        (!parameters.bond || std::max(point.part[0], point.part[1]) >= problem.bonding_parts))
-      return;
+    if (joined[point.part[0]] || joined[point.part[1]] || (!parameters.bond && !is_named(point.part))) return;
     const Weights weights = jump(point);
     auto [entry, fresh] =
         by_elements.try_emplace(elements_of(point), Matrix::Zero(weights.size(), weights.size()));
@@ -167,7 +191,8 @@ std::optional<Bonds> Bonds::make(const Parameters& parameters, const Problem& pr
     area[{std::min(point.part[0], point.part[1]), std::max(point.part[0], point.part[1])}] += point.area;
   });
   for (std::size_t n = 0; n < named.size(); ++n)
-    if (!area.contains(named[n].parts)) refuse_apart(parameters.named[n]);
+    if (!area.contains(named[n].parts) && !joined[named[n].parts[0]] && !joined[named[n].parts[1]])
+      refuse_apart(parameters.named[n]);
   if (by_elements.empty()) return std::nullopt;
   for (const auto& [elements, stiffness] : by_elements) made.bonds_.push_back({elements, stiffness});
   for (const auto& [parts, shared] : area)
@@ -176,26 +201,37 @@ std::optional<Bonds> Bonds::make(const Parameters& parameters, const Problem& pr
   return made;
 }
 
-// Lowers each matrix so that no element's rows together are stiffer than what is allowed times its mass.
-void Bonds::soften(const Problem& problem) {
+std::vector<double> Bonds::softening(const Problem& problem, const std::vector<Rows>& all) {
   const Resisting resists = resisting(problem);
-  const auto rows = [&] {
-    std::vector<double> sum(resists.mass.size(), 0);
-    for (const BondedElements& bond : bonds_)
-      for (Eigen::Index a = 0; a < bond.stiffness.rows(); ++a)
-        sum[resists.node[bond.element(a)]] += bond.stiffness.row(a).cwiseAbs().sum();
-    return sum;
-  };
-  const std::vector<double> stiff = rows();
-  for (BondedElements& bond : bonds_) {
-    double scale = 1;
-    for (Eigen::Index a = 0; a < bond.stiffness.rows(); ++a) {
-      const std::uint32_t node = resists.node[bond.element(a)];
-      if (stiff[node] > 0) scale = std::min(scale, resists.most[node] * resists.mass[node] / stiff[node]);
+  std::vector<double> stiff(resists.mass.size(), 0);
+  for (const Rows& rows : all)
+    for (const auto& [element, sum] : rows) stiff[resists.node[element]] += sum;
+  std::vector<double> left(all.size(), 1);
+  for (std::size_t n = 0; n < all.size(); ++n)
+    for (const auto& [element, sum] : all[n]) {
+      const std::uint32_t node = resists.node[element];
+      if (stiff[node] > 0) left[n] = std::min(left[n], resists.most[node] * resists.mass[node] / stiff[node]);
     }
-    bond.stiffness *= scale;
+  return left;
+}
+
+Bonds::Rows Bonds::row_sums(const BondedElements& bond) {
+  Rows rows;
+  for (Eigen::Index a = 0; a < bond.stiffness.rows(); ++a)
+    rows.emplace_back(bond.element(a), bond.stiffness.row(a).cwiseAbs().sum());
+  return rows;
+}
+
+void Bonds::soften(const Problem& problem) {
+  std::vector<Rows> all;
+  for (const BondedElements& bond : bonds_) all.push_back(row_sums(bond));
+  const std::vector<double> left = softening(problem, all);
+  const Resisting resists = resisting(problem);
+  std::vector<double> soft(resists.mass.size(), 0);
+  for (std::size_t n = 0; n < bonds_.size(); ++n) {
+    bonds_[n].stiffness *= left[n];
+    for (const auto& [element, sum] : all[n]) soft[resists.node[element]] += left[n] * sum;
   }
-  const std::vector<double> soft = rows();
   for (std::size_t e = 0; e < soft.size(); ++e)
     if (soft[e] > 0) frequency_ = std::max(frequency_, soft[e] / resists.mass[e]);
 }

@@ -8,6 +8,8 @@
 // to the ground) take four times the iterations and change a bar's end by 0.1
 // %. One matrix holds all the points between the same carriers.
 //
+// Parts that joined in a timed run are left out (simulate/events/joined_bonds.h).
+//
 // In a timed run k_q is lowered, matrix by matrix, until its frequency squared is twice that of the cells:
 // the step is cut by at most sqrt(3), and a bond yields like a fifth of a cell.
 #pragma once
@@ -36,8 +38,15 @@ class Bonds : public Effect {
   [[nodiscard]] static std::vector<TouchingGap> named_gaps(const Parameters& parameters, const Body& body);
   // Throws InputError: the parts do not touch.
   [[noreturn]] static void refuse_apart(const Named& named);
+  // Throws InputError: one of them joined in an earlier run, and nothing holds it to the other.
+  static void refuse_joined_apart(const Parameters& parameters, const Body& body);
   static void parse(TableReader& scene, Parameters& parameters);
   [[nodiscard]] static std::optional<Bonds> make(const Parameters& parameters, const Problem& problem);
+  // Of what resists between elements: its row sums [N/m], by the elements.
+  using Rows = std::vector<std::pair<std::uint32_t, double>>;
+  // What is left of each in a timed run so that no element's rows together are stiffer than what is allowed times its
+  // mass.
+  [[nodiscard]] static std::vector<double> softening(const Problem& problem, const std::vector<Rows>& all);
   // Whether parts of these numbers are bonded with one another.
   [[nodiscard]] bool holds(std::uint32_t one, std::uint32_t other, const Body& body) const;
   [[nodiscard]] std::string why() const override;
@@ -63,6 +72,7 @@ class Bonds : public Effect {
     }
   };
   using Displacements = Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 16, 3>;
+  [[nodiscard]] static Rows row_sums(const BondedElements& bond);
   void soften(const Problem& problem);
   [[nodiscard]] static Displacements displacements(const BondedElements& bond, const State& state);
 

@@ -19,6 +19,7 @@
 #include "formats/lattice/quadratic_field.h"
 #include "simulate/estimate/coarse_grid.h"
 #include "simulate/estimate/coarse_moments.h"
+#include "simulate/matter/joined_parts.h"
 #include "simulate/matter/stress.h"
 #include "simulate/thermal/thermal_settings.h"
 
@@ -264,8 +265,8 @@ void refuse(const Body& body) {
       if (!is_stress_column(name) && name != "velocity" && name != kQuadraticColumn &&
           name != kTemperatureColumn)
         throw InputError(fmt::format("the body remembers an earlier run or an event (\"{}\")", name));
-  if (body.notes.contains(kFusedNote))
-    throw InputError("an earlier run or an event fused points of the body");
+  if (body.notes.contains(kFusedNote) || body.notes.contains(kJoinedNote))
+    throw InputError("an earlier run or an event fused points of the body, or brought parts");
   for (const Part& part : body.parts) {
     if (part.placement == Placement::centre)
       throw InputError(fmt::format("part \"{}\" has its elements at the voxels' centres", part.name));

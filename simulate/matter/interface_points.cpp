@@ -126,7 +126,7 @@ class TouchingSearch {
 
  private:
   [[nodiscard]] double tolerance(std::uint32_t part) const {
-    return std::max(kOfDiagonal * diagonal_, kOfSpacing * body_.parts[part].lattice.spacing.minCoeff());
+    return touching_distance(diagonal_, body_.parts[part].lattice.spacing.minCoeff());
   }
   [[nodiscard]] double wider_gap(std::uint32_t a, std::uint32_t b) const {
     double gap = 0;
@@ -288,6 +288,10 @@ void TouchingSearch::operator()(const Use& use) {
 }
 
 }  // namespace
+
+double touching_distance(double diagonal, double spacing) {
+  return std::max(kOfDiagonal * diagonal, kOfSpacing * spacing);
+}
 
 void for_each_touching_point(const Problem& problem, const std::vector<TouchingGap>& wider,
                              const std::function<void(const TouchingPoint&)>& use) {

@@ -14,8 +14,12 @@ struct TouchingPoint {
   Vec3 normal = Vec3::Zero();              // at rest, out of part[0] into part[1]
 };
 
-// Points of the finer part's surface (surface_points()) that lie within 1e-6 of the body's diagonal, or 0.01
-// of the finer spacing, of a polygon of the other part that faces them within 45 degrees. Each point touches
+// m: how near a point of the surface of a part of that (least) spacing is to another part that it touches, in a body of
+// that diagonal.
+[[nodiscard]] double touching_distance(double diagonal, double spacing);
+
+// Points of the finer part's surface (surface_points()) that lie within that distance, 1e-6 of the body's diagonal
+// or 0.01 of the finer spacing, of a polygon of the other part that faces them within 45 degrees. Each point touches
 // the nearest such polygon. Stray matter is left out. Order: by pair of parts, then by polygon.
 //
 // `wider`: pairs of parts (lower number first) whose surfaces count as touching over a gap [m].

@@ -5,9 +5,12 @@
 
 #include <fmt/format.h>
 
+#include <limits>
+
 #include "base/error.h"
 #include "base/units.h"
 #include "simulate/matter/surface_points.h"
+#include "simulate/scene/coming_parts.h"
 
 namespace flexel::simulate {
 namespace {
@@ -101,13 +104,17 @@ ProbePoints place_selection(const Probe& probe, const Problem& problem) {
 
 std::vector<ProbePoints> place_probes(const Scene& scene, const Problem& problem) {
   std::vector<ProbePoints> placed;
-  for (const Probe& probe : scene.probes)
-    placed.push_back(probe.at ? place_point(probe, problem) : place_selection(probe, problem));
+  for (const Probe& probe :
+       scene.coming_parts.empty() ? scene.probes : without_coming_probes(scene, problem.body))
+    placed.push_back(probe.at      ? place_point(probe, problem)
+                     : probe.where ? place_selection(probe, problem)
+                                   : ProbePoints{probe.name});
   return placed;
 }
 
 ProbeResult measure(const ProbePoints& probe, const State& state) {
   ProbeResult result{probe.name, probe.where, Vec3::Zero()};
+  if (probe.is_to_come()) result.displacement.setConstant(std::numeric_limits<double>::quiet_NaN());
   for (const auto& [element, weight] : probe.weights)
     result.displacement += weight * state.displacement[element];
   return result;

@@ -13,9 +13,11 @@ namespace flexel::simulate {
 // Weights sum to 1.
 struct ProbePoints {
   std::string name;
-  Vec3 where = Vec3::Zero();                              // m, rest: the point, or the mean of the selection
-  std::vector<std::pair<std::uint32_t, double>> weights;  // element, weight
-  std::optional<std::uint32_t> cell = {};                 // of a point that a cell carries
+  Vec3 where = Vec3::Zero();  // m, rest: the point, or the mean of the selection
+  std::vector<std::pair<std::uint32_t, double>> weights = {};  // element, weight
+  std::optional<std::uint32_t> cell = {};                      // of a point that a cell carries
+  // Of parts that events will bring: no number yet.
+  [[nodiscard]] bool is_to_come() const { return weights.empty(); }
 };
 
 // Throws InputError: a point further than one spacing from all matter, a selection that selects nothing.

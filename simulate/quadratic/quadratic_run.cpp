@@ -16,6 +16,7 @@
 #include "simulate/estimate/stress_singularity.h"
 #include "simulate/matter/fragments.h"
 #include "simulate/matter/interpolation_weights.h"
+#include "simulate/matter/joined_parts.h"
 #include "simulate/models/cells.h"
 #include "simulate/models/stiffness.h"
 #include "simulate/probes/probes.h"
@@ -230,10 +231,11 @@ void refuse_what_quadratic_lacks(const Scene& scene, const Body& body,
                          fmt::format("{}it does not know what an earlier run left in the body (\"{}\"); use "
                                      "model \"cells\"",
                                      needs, name));
-  if (body.notes.contains(kFusedNote))
+  if (body.notes.contains(kFusedNote) || body.notes.contains(kJoinedNote))
     throw InputError(
         scene.name,
-        fmt::format("{}it does not know points that an earlier run fused; use model \"cells\"", needs));
+        fmt::format("{}it does not know parts that an earlier run fused or brought; use model \"cells\"",
+                    needs));
   for (const Manipulator& each : scene.get<RigidParts>().manipulators)
     throw InputError(
         each.origin,

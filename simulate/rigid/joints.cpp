@@ -10,6 +10,7 @@
 #include <limits>
 #include <numbers>
 #include <numeric>
+#include <utility>
 
 #include "base/error.h"
 #include "base/math/dense.h"
@@ -84,6 +85,7 @@ JointSystem::JointSystem(std::vector<Place> places, double size, double duration
       size_(size),
       duration_(duration),
       travel_(places_.size(), 0),
+      stalled_(places_.size(), 0),
       reactions_(places_.size()),
       borne_(2 * places_.size(), Vec3::Zero()) {
   std::size_t bodies = 0;
@@ -208,11 +210,24 @@ void JointSystem::begin(std::span<JointedBody> bodies, bool fresh) {
                       "a run with this joint left",
                       place.joint.name, human_length(most)));
     row += own;
+    refuse_turned_over(place, bodies);
     travel_[p] = travelled(place, frame(place, 0, pose_of(bodies, place.sides[0], false)),
                            frame(place, 1, pose_of(bodies, place.sides[1], false)), travel_[p]);
   }
   refuse_locked(bodies);
   if (fresh) refuse_speeds(bodies);
+}
+
+// Axes that point against each other, or a slider turned by half a turn, hold too.
+void JointSystem::refuse_turned_over(const Place& place, std::span<const JointedBody> bodies) const {
+  const Frame a = frame(place, 0, pose_of(bodies, place.sides[0], false)),
+              b = frame(place, 1, pose_of(bodies, place.sides[1], false));
+  if (a.axis.dot(b.axis) < 0 || (place.joint.kind == JointKind::slider && a.first.dot(b.first) < 0))
+    throw InputError(
+        place.joint.origin,
+        fmt::format("joint \"{}\" is turned over where the run begins: one of its parts was led by half a "
+                    "turn against the other since they rested; take a body in which it was not",
+                    place.joint.name));
 }
 
 // By groups of parts that joints tie together, without the world and what is led.
@@ -349,12 +364,25 @@ double missing_speed(const JointSystem::Place& place, const Vec3& axis, std::spa
 }  // namespace
 
 // Motors that would need more than their couple get that, and turn slower; so where the joints do not let them have their
-// speed at all, as at a dead centre.
+// speed at all, as at a dead centre. Those that stalled in the last step are first taken to do so again, unless that made
+// them faster than they are to turn: where the joints hold them, all rounds would be spent on finding that out.
 VectorXd JointSystem::hold(std::span<JointedBody> bodies, const Rows& all, double kick, double drift) {
   const std::vector<JointedBody> start(bodies.begin(), bodies.end());
   VectorXd given = VectorXd::Zero(static_cast<Index>(all.row.size()));
-  std::vector<Index> open(all.row.size());
-  std::iota(open.begin(), open.end(), Index{0});
+  const auto most = [&](Index i) {
+    return *places_[all.row[static_cast<std::size_t>(i)].place].joint.torque * kick / size_;
+  };
+  for (Index i = 0; i < given.size(); ++i)
+    if (const Rows::Row& row = all.row[static_cast<std::size_t>(i)]; row.drives && stalled_[row.place] != 0)
+      given[i] = stalled_[row.place] * most(i);
+  bool guessed = !given.isZero(0);
+  std::vector<Index> open;
+  const auto open_rest = [&] {
+    open.clear();
+    for (Index i = 0; i < given.size(); ++i)
+      if (given[i] == 0) open.push_back(i);
+  };
+  open_rest();
   for (;;) {
     std::copy(start.begin(), start.end(), bodies.begin());
     push(bodies, all, given);
@@ -365,20 +393,36 @@ VectorXd JointSystem::hold(std::span<JointedBody> bodies, const Rows& all, doubl
     } catch (const DivergedError&) {
       unheld = std::current_exception();
     }
+    if (std::exchange(guessed, false) && (unheld || is_too_fast(bodies, all, given, drift))) {
+      given.setZero();
+      open_rest();
+      continue;
+    }
     const std::size_t rows_open = open.size();
-    std::erase_if(open, [&](Index i) {
+    for (const Index i : open) {
       const Rows::Row& row = all.row[static_cast<std::size_t>(i)];
-      if (!row.drives || !places_[row.place].joint.torque) return false;
-      const double most = *places_[row.place].joint.torque * kick / size_;
-      if (!unheld && !(std::abs(impulses[i]) > most)) return false;
       const Place& place = places_[row.place];
-      given[i] = std::copysign(most, unheld ? missing_speed(place, row.turn[0] / size_, start) : impulses[i]);
-      return true;
-    });
+      if (!row.drives || !place.joint.torque || !(unheld || std::abs(impulses[i]) > most(i))) continue;
+      given[i] =
+          std::copysign(most(i), unheld ? missing_speed(place, row.turn[0] / size_, start) : impulses[i]);
+    }
+    open_rest();
     if (open.size() < rows_open) continue;
     if (unheld) std::rethrow_exception(unheld);
+    for (Index i = 0; i < given.size(); ++i)
+      if (const Rows::Row& row = all.row[static_cast<std::size_t>(i)]; row.drives)
+        stalled_[row.place] = given[i] == 0 ? 0 : std::copysign(1.0, given[i]);
     return impulses;
   }
+}
+
+// Whether a motor that gets its couple turns further, the way that it drives, than it is to.
+bool JointSystem::is_too_fast(std::span<const JointedBody> bodies, const Rows& all, const VectorXd& given,
+                              double drift) const {
+  const VectorXd missed = misfit_of_step(bodies, all, drift);
+  for (Index i = 0; i < given.size(); ++i)
+    if (given[i] * missed[i] > 0) return true;
+  return false;
 }
 
 void JointSystem::tell(std::span<const JointedBody> bodies, const Rows& all, const VectorXd& impulses,
@@ -509,6 +553,7 @@ double JointSystem::first_step() const {
 
 std::vector<double> JointSystem::memory() const {
   std::vector<double> memory = travel_;
+  memory.insert(memory.end(), stalled_.begin(), stalled_.end());
   for (const std::vector<Vec3>* rates : {&borne_, &spun_})
     for (const Vec3& each : *rates) memory.insert(memory.end(), each.begin(), each.end());
   for (const Reaction& each : reactions_) {
@@ -522,7 +567,7 @@ std::vector<double> JointSystem::memory() const {
 }
 
 bool JointSystem::restore(const std::vector<double>& memory) {
-  if (memory.size() != travel_.size() + 3 * (borne_.size() + spun_.size()) + 8 * reactions_.size() + 4)
+  if (memory.size() != 2 * travel_.size() + 3 * (borne_.size() + spun_.size()) + 8 * reactions_.size() + 4)
     return false;
   const double* from = memory.data();
   const auto take = [&](auto& values) {
@@ -530,6 +575,7 @@ bool JointSystem::restore(const std::vector<double>& memory) {
     from += values.size();
   };
   take(travel_);
+  take(stalled_);
   for (std::vector<Vec3>* rates : {&borne_, &spun_})
     for (Vec3& each : *rates) take(each);
   for (Reaction& each : reactions_) {

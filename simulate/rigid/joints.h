@@ -97,6 +97,7 @@ class JointSystem {
   [[nodiscard]] Rows rows(std::span<const JointedBody> bodies, bool motors) const;
   [[nodiscard]] double travelled(const Place& place, const Frame& first, const Frame& second,
                                  double near) const;
+  void refuse_turned_over(const Place& place, std::span<const JointedBody> bodies) const;
   void refuse_locked(std::span<const JointedBody> bodies) const;
   void refuse_speeds(std::span<JointedBody> bodies) const;
   void forget_rates();
@@ -105,6 +106,8 @@ class JointSystem {
   void push(std::span<JointedBody> bodies, const Rows& rows, const Eigen::VectorXd& impulses) const;
   [[nodiscard]] Eigen::VectorXd hold(std::span<JointedBody> bodies, const Rows& rows, double kick,
                                      double drift);
+  [[nodiscard]] bool is_too_fast(std::span<const JointedBody> bodies, const Rows& rows,
+                                 const Eigen::VectorXd& given, double drift) const;
   void find(std::span<JointedBody> bodies, const Rows& rows, const std::vector<Eigen::Index>& open,
             double drift, Eigen::VectorXd& impulses) const;
   using Velocity = std::array<Vec3, 2>;  // m/s, of the centre of mass; rad/s
@@ -116,6 +119,8 @@ class JointSystem {
   std::vector<Place> places_;
   double size_, duration_;
   std::vector<double> travel_;  // (places) rad or m
+  std::vector<double>
+      stalled_;  // (places) 1, -1: the motor gave all of its couple in the last step, that way; else 0
   std::vector<Reaction> reactions_;
   Power before_, after_;
   std::vector<Velocity> on_led_;  // (bodies) N, N m: of joints, about the centre of mass

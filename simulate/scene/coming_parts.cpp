@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "simulate/effects/bonds.h"
+#include "simulate/effects/contact.h"
 #include "simulate/input/part_names.h"
 
 namespace flexel::simulate {
@@ -42,8 +44,25 @@ EffectParameters without_coming_parts(const Scene& scene, const Body& body) {
     if (std::find(here.begin(), here.end(), part) != here.end()) continue;
     leave_out_of(parameters.get<Loads>().loads, part);
     leave_out_of(parameters.get<Supports>().ties, part);
+    const auto names_it = [&](const std::array<std::string, 2>& parts) {
+      return parts[0] == part || parts[1] == part;
+    };
+    std::erase_if(parameters.get<Bonds>().named,
+                  [&](const Bonds::Named& each) { return names_it(each.parts); });
+    std::erase_if(parameters.get<Contact>().bonded, names_it);
   }
   return parameters;
+}
+
+std::vector<Probe> without_coming_probes(const Scene& scene, const Body& body) {
+  std::vector<Probe> probes = scene.probes;
+  const std::vector<std::string> here = part_names(body);
+  for (const std::string& part : scene.coming_parts) {
+    if (std::find(here.begin(), here.end(), part) != here.end()) continue;
+    for (Probe& probe : probes)
+      if (probe.where && !leave_out(*probe.where, part)) probe.where.reset();
+  }
+  return probes;
 }
 
 Scene at_the_beginning(const Scene& scene, const Body& body) {

@@ -41,8 +41,7 @@ struct Problem {
   std::optional<double> duration = {};  // s, of a timed run; nothing: equilibrium
   // (elements) m, displacement that fixes and moves start from (simulate/models/rest_shape.h); empty: none
   std::vector<Vec3> settled = {};
-  std::size_t bonding_parts = SIZE_MAX;  // the first ones; later ones joined in a run, and bond with nothing
-  std::vector<Rigidity> rigidity = {};   // (parts); empty: none is rigid
+  std::vector<Rigidity> rigidity = {};  // (parts); empty: none is rigid
 };
 
 // The state of a body as a run finds it: displaced to its positions, with its column "velocity" where it has

@@ -27,7 +27,7 @@ namespace flexel::simulate {
 namespace {
 
 constexpr char kMagic[8] = {'f', 'l', 'e', 'x', 'e', 'l', 'C', 'P'};
-constexpr std::uint64_t kVersion = 8;
+constexpr std::uint64_t kVersion = 9;
 
 struct Head {
   char magic[8];
@@ -58,8 +58,8 @@ static void visit(Archive& archive, Checkpoint& c) {
             c.state.kick, c.clock, c.memory.cells.fill, c.memory.cells.plastic, c.memory.cells.springs,
             c.memory.cells.spring_flow, c.memory.connections.flowed, c.memory.connections.strain,
             c.memory.connections.broken, c.memory.reach, c.memory.supports, c.events, c.settled, c.fused,
-            c.bonding_parts, c.memory.effects, c.ledger.accounts, c.ledger.rows, c.ledger.probes,
-            c.ledger.columns, c.ledger.start, c.ledger.changed, c.ledger.worst_residual, c.ledger.unstored,
+            c.memory.effects, c.ledger.accounts, c.ledger.rows, c.ledger.probes, c.ledger.columns,
+            c.ledger.start, c.ledger.changed, c.ledger.worst_residual, c.ledger.unstored,
             c.ledger.unstored_now, c.ledger.worst_unstored, c.ledger.largest_term, c.next_row, c.next_frame,
             c.frames.times, c.frames.surface_frame, c.frames.surface_parts);
 }

@@ -21,10 +21,9 @@ struct Checkpoint {
   State state;
   Clock clock;
   TimeSegment::Memory memory;
-  std::uint64_t events = 0;         // that have happened
-  std::vector<Vec3> settled;        // of SegmentStart, as are
-  std::vector<FusedPoint> fused;    // these
-  std::uint64_t bonding_parts = 0;  // and this
+  std::uint64_t events = 0;       // that have happened
+  std::vector<Vec3> settled;      // of SegmentStart, as are
+  std::vector<FusedPoint> fused;  // these
   Ledger ledger;
   double next_row = 0, next_frame = 0;  // s
   SeriesPlace frames;                   // of the series so far

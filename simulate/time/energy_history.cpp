@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/files/append_text.h"
+#include "base/files/csv.h"
 #include "base/parallel.h"
 #include "simulate/stepping/failure_messages.h"
 
@@ -53,9 +54,13 @@ std::string Ledger::csv() const {
   for (const char* name : {"momentum", "angular momentum"})
     for (const char axis : {'x', 'y', 'z'})
       append_text(text, ",{} {} [{}]", name, axis, std::string(name) == "momentum" ? "kg m/s" : "kg m2/s");
+  const auto name_column = [&](const std::string& name) {
+    text += ',';
+    text += csv_field(name);
+  };
   for (const std::string& probe : probes)
-    for (const char axis : {'x', 'y', 'z'}) append_text(text, ",{} {} [m]", probe, axis);
-  for (const std::string& column : columns) append_text(text, ",{}", column);
+    for (const char axis : {'x', 'y', 'z'}) name_column(fmt::format("{} {} [m]", probe, axis));
+  for (const std::string& column : columns) name_column(column);
   text += '\n';
   for (const BookRow& row : rows) {
     const Energies& e = row.energies;

@@ -36,9 +36,8 @@ struct Clock {
 struct SegmentStart {
   // The run begins: effects that change the state at its start do, and held elements are put on their paths.
   bool fresh = true;
-  std::vector<Vec3> settled = {};        // Problem::settled
-  std::vector<FusedPoint> fused = {};    // by events so far
-  std::size_t bonding_parts = SIZE_MAX;  // Problem::bonding_parts
+  std::vector<Vec3> settled = {};      // Problem::settled
+  std::vector<FusedPoint> fused = {};  // by events so far
   // What effects hand over, by their names, across an event.
   std::vector<std::pair<std::string, std::vector<double>>> transferred_states = {};
 };

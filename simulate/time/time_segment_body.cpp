@@ -24,7 +24,6 @@ Problem timed_problem(const Body& body, const Scene& scene, const SegmentStart& 
           {},
           scene.run.time,
           beginning.settled,
-          beginning.bonding_parts,
           RigidParts::rigidity(scene.get<RigidParts>(), body)};
 }
 

@@ -18,7 +18,8 @@ void TimeSegment::tell_forces(SimulateResult& result) const {
 
 void TimeSegment::report(const Clock& clock, bool stress, SimulateResult& result) {
   tell_forces(result);
-  for (const ProbePoints& probe : probes_) result.probes.push_back(measure(probe, state_));
+  for (const ProbePoints& probe : probes_)
+    if (!probe.is_to_come()) result.probes.push_back(measure(probe, state_));
   const Stencil none;
   const Cells cells(problem_, none);
   const std::optional<double> inelastic = stepper_->elastic_energy(state_);

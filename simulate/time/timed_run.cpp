@@ -19,12 +19,15 @@
 #include "simulate/contact/pairs/stuck_places.h"
 #include "simulate/effects/contact.h"
 #include "simulate/events/edit.h"
+#include "simulate/events/joined_bonds.h"
 #include "simulate/events/repeated_events.h"
 #include "simulate/live/live_link.h"
+#include "simulate/matter/joined_parts.h"
 #include "simulate/models/damping_factors.h"
 #include "simulate/models/rest_shape.h"
 #include "simulate/models/set_rest_shape.h"
 #include "simulate/probes/report.h"
+#include "simulate/scene/coming_parts.h"
 #include "simulate/time/checkpoint.h"
 #include "simulate/time/dynamic_relaxation.h"
 #include "simulate/time/last_sound.h"
@@ -57,6 +60,7 @@ class TimedRun {
   void play_until(double end, bool resumed);
   void enter_half_step();
   void apply(std::size_t end);
+  void bond_joined(std::size_t first, const State& state);
   void check();
   void step();
   void advance(bool row);
@@ -112,7 +116,6 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
                     contact.parting, duration_));
   start_.settled = settled_displacement(body);
   start_.fused = fused_points(body);
-  start_.bonding_parts = body.parts.size();
   if (!options.series.empty()) series_.emplace(options.series, options.compress);
   if (!options.checkpoint.empty()) {
     kept_.emplace();
@@ -160,7 +163,7 @@ void TimedRun::begin() {
 
 void TimedRun::resume(const Checkpoint& from) {
   clock_ = from.clock;
-  start_ = {false, from.settled, from.fused, from.bonding_parts};
+  start_ = {false, from.settled, from.fused};
   events_ = std::min<std::size_t>(from.events, scene_.events.size());
   segment_.emplace(body_, scene_, options_, progress_, start_, from.state);
   segment_->restore(from.memory);
@@ -186,7 +189,6 @@ void TimedRun::keep() {
   kept_->events = events_;
   kept_->settled = start_.settled;
   kept_->fused = start_.fused;
-  kept_->bonding_parts = start_.bonding_parts;
   if (history_) kept_->ledger = history_->ledger();
   if (series_) kept_->frames = series_->place();
   kept_->next_row = next_row_;
@@ -339,6 +341,18 @@ std::string TimedRun::stop() {
   return saved;
 }
 
+// Parts from number `first` on have come.
+void TimedRun::bond_joined(std::size_t first, const State& state) {
+  if (first == body_.parts.size()) return;
+  note_joined_parts(body_, first);
+  const std::vector<FusedPoint> bonds =
+      joined_bonds(timed_problem(body_, scene_, start_), state, static_cast<std::uint32_t>(first),
+                   without_coming_parts(scene_, body_).get<Bonds>(), start_.fused);
+  start_.fused.insert(start_.fused.end(), bonds.begin(), bonds.end());
+  if (!bonds.empty())
+    progress_.say(fmt::format("what came is bonded where it touches, in {} points", bonds.size()));
+}
+
 // Events up to `end` happen now, and another act begins.
 void TimedRun::apply(std::size_t end) {
   const StopWaits whole;  // between two acts there is no state to save
@@ -359,6 +373,7 @@ void TimedRun::apply(std::size_t end) {
   start_.fresh = false;
   segment_.reset();
   const bool was_edited = edits_damping(body_);
+  const std::size_t parts = body_.parts.size();
   body_.notes.erase(kFusedNote);  // events change start_.fused and the numbers of elements
   body_.notes.erase(kStuckNote);  // in the transferred states
   for (; events_ < end; ++events_) {
@@ -369,6 +384,7 @@ void TimedRun::apply(std::size_t end) {
     const std::string what = repeated_.happen(event, context);
     if (!what.empty()) progress_.say(fmt::format("at {:.4g} s {}: {}", event.at, event.name, what));
   }
+  bond_joined(parts, state);
   for (auto& [name, transferred] : start_.transferred_states)
     if (name == Contact::name)
       for (const StuckPlaces& came : stuck_places(body_))  // with bodies that were added

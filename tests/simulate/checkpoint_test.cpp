@@ -41,7 +41,6 @@ Checkpoint some_checkpoint(const Body& body) {
   c.events = 2;
   c.settled = c.state.velocity;
   c.fused = {{{1, 2, 3}, {0.5, 0.5, -1}, 6}, {{}, {}, 7}};
-  c.bonding_parts = 15;
   c.ledger.accounts = {{"loads", Account::Kind::work, 1.5}, {"damping", Account::Kind::dissipation, -2}};
   BookRow row;
   row.time = 9;

@@ -236,7 +236,7 @@ TEST(Events, FusedBlocksFlyAsOne) {
   options.name = "left";
   Body body = box_body(options);
   options.name = "right";
-  options.origin = Vec3(4.01e-2, 0.3e-2, 0.2e-2);  // 0.1 mm away, shifted
+  options.origin = Vec3(4.015e-2, 0.3e-2, 0.2e-2);  // 0.15 mm away, shifted
   const Body right = box_body(options);
   const flexel::test::Scratch scratch;
   const std::string path = scratch.path("fuse_right.vtu");

@@ -356,6 +356,20 @@ TEST(Joints, AJointedPartLiesOnWhatItFallsOn) {
   EXPECT_LT(book(made.result, "worst_residual"), 0.01 * book(made.result, "largest_term"));
 }
 
+// A bar that an earlier run left turned over: its axis, or what slides, is where it was and points the other way.
+TEST(Joints, APartThatIsTurnedOverIsRefused) {
+  const Vec3 at(2 * kSide, kSide, kSide);
+  for (const auto& [kind, axis] :
+       {std::pair{JointKind::hinge, Vec3(Vec3::UnitZ())}, {JointKind::slider, Vec3(Vec3::UnitX())}}) {
+    Scene scene = mechanism({"bar"}, 0.01);
+    join(scene, joint_of(kind, "bar", "", at, axis));
+    Body bar = block("bar", {4, 2, 2});
+    EXPECT_EQ(testing::refusal(bar, scene), "accepted");
+    for (Vec3& x : bar.position) x = at + Vec3(x.x() - at.x(), at.y() - x.y(), at.z() - x.z());
+    EXPECT_THAT(testing::refusal(bar, scene), HasSubstr("turned over"));
+  }
+}
+
 std::string joint_refusal(const std::string& rest) {
   try {
     (void)joined(rest);

@@ -6,21 +6,14 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
-#include <sstream>
 
 #include "base/error.h"
+#include "base/files/csv.h"
 
 namespace flexel::study {
 namespace {
 
 constexpr int kShifts = 400;  // to either side
-
-std::vector<std::string> split(const std::string& line) {
-  std::vector<std::string> cells;
-  std::istringstream in(line);
-  for (std::string cell; std::getline(in, cell, ',');) cells.push_back(cell);
-  return cells;
-}
 
 // Linear between the rows, constant outside.
 double at(const std::vector<double>& time, const std::vector<double>& value, double t) {
@@ -41,16 +34,13 @@ const std::vector<double>* History::find(const std::string& name) const {
 
 History read_history(const std::string& path) {
   std::ifstream in(path);
-  std::string line;
-  if (!std::getline(in, line)) throw InputError(path, "no table of a timed run");
   History history;
-  history.names = split(line);
-  if (history.names.empty() || history.names.front() != "time [s]")
+  if (!read_csv_row(in, history.names)) throw InputError(path, "no table of a timed run");
+  if (history.names.front() != "time [s]")
     throw InputError(path, "the first column of a timed run's table is \"time [s]\"");
   history.names.erase(history.names.begin());
   history.columns.resize(history.names.size());
-  while (std::getline(in, line)) {
-    const std::vector<std::string> cells = split(line);
+  for (std::vector<std::string> cells; read_csv_row(in, cells);) {
     if (cells.size() != history.names.size() + 1) throw InputError(path, "a row is cut short");
     history.time.push_back(std::strtod(cells[0].c_str(), nullptr));
     for (std::size_t c = 1; c < cells.size(); ++c)
@@ -74,6 +64,10 @@ std::optional<double> lag(const std::vector<double>& time, const std::vector<dou
                           const std::vector<double>& reference_time, const std::vector<double>& reference) {
   if (time.size() < 2 || reference_time.size() < 2 || motion.size() != time.size() ||
       reference.size() != reference_time.size())
+    return std::nullopt;
+  const auto is_finite = [](double value) { return std::isfinite(value); };  // of what was not there yet
+  if (!std::all_of(motion.begin(), motion.end(), is_finite) ||
+      !std::all_of(reference.begin(), reference.end(), is_finite))
     return std::nullopt;
   const auto [least, most] = std::minmax_element(reference.begin(), reference.end());
   if (!(*most > *least)) return std::nullopt;

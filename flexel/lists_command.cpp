@@ -1,4 +1,5 @@
-// flexel scene-keys: every key of a scene, from the lists that the program reads scenes with.
+// What scenes know: flexel scene-keys, every key, from the lists that the program reads scenes with; flexel materials, the
+// library.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,6 +10,7 @@
 #include "base/json.h"
 #include "base/program/arguments.h"
 #include "flexel/commands.h"
+#include "flexel/measure/materials_table.h"
 #include "simulate/scene/scene_keys.h"
 
 namespace flexel::commands {
@@ -92,6 +94,25 @@ int scene_keys_command(int argc, char** argv) {
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   OutputFile out("-", false);
   out.write(json ? as_json() : words ? as_words() : markdown ? as_markdown() : as_text());
+  out.commit();
+  return kExitDone;
+}
+
+int materials_command(int argc, char** argv) {
+  bool json = false, markdown = false, words = false;
+  CommandLine app{"Lists the materials that scenes and --material know, each figure with its source.",
+                  "flexel materials"};
+  const Option as_json = app.add_flag("--json", json, "As JSON, in SI units");
+  const Option as_page = app.add_flag("--markdown", markdown, "As a table in Markdown").excludes(as_json);
+  app.add_flag("--words", words, "The names alone, a line each, for completion")
+      .excludes(as_json)
+      .excludes(as_page);
+  if (!parse_arguments(app, argc, argv)) return kExitDone;
+  OutputFile out("-", false);
+  out.write(json       ? materials_json()
+            : markdown ? materials_markdown()
+            : words    ? materials_words()
+                       : materials_text());
   out.commit();
   return kExitDone;
 }
