@@ -18,6 +18,7 @@
 #include "base/program/termination.h"
 #include "base/resources.h"
 #include "base/stop.h"
+#include "base/time_left.h"
 #include "base/units.h"
 #include "flexel/accuracy/resolution_search.h"
 #include "flexel/accuracy/run_error.h"
@@ -373,6 +374,7 @@ class GoalRuns {
         return run;
       }
       usual_size_ = made(size).size;
+      if (arguments_.closer) refuse_scene_of_closer_look(made_->voxels.body);
       model_.choose(made_->voxels);
       if (model_.chosen()) return size_of(made(size));
       return size_of(*made_);
@@ -495,6 +497,12 @@ class GoalRuns {
     return static_cast<std::size_t>(std::clamp(allowed, 1.0, static_cast<double>(count)));
   }
 
+  void refuse_scene_of_closer_look(const Body& body) const {
+    Job job = plan_.job;
+    add_actions(job, body);
+    simulate::refuse_closer_look(body, job.scene);
+  }
+
   static SolvedRun size_of(const SolvedRun& made) {
     SolvedRun run;
     run.size = made.size;
@@ -596,7 +604,8 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
   return run;
 }
 
-// The run that was chosen again, with a closer look at its largest stress. Its bars stay, which other sizes may have widened.
+// The run that was chosen again, with a closer look at its largest stress. Its bars stay, which other sizes may have widened; so does it
+// where that takes more than half of the time left.
 SolvedRun with_closer_look(const DeformArguments& arguments, const Plan& plan, const Surface& surface,
                            SolvedRun chosen, Progress& progress) {
   HeldWarnings told;  // by the run that was chosen
@@ -604,16 +613,24 @@ SolvedRun with_closer_look(const DeformArguments& arguments, const Plan& plan, c
   Progress inner("flexel", Progress::Mode::quiet);
   voxelize::VoxelizeOptions how = plan.job.voxelize;
   how.size = chosen.size;
-  const simulate::ErrorBars bars = std::move(chosen.simulated.error_bars);
-  chosen.voxels = voxelize::voxelize(surface, how, inner);
-  Job job = plan.job;
-  add_actions(job, chosen.voxels.body);
-  simulate::SimulateOptions asked = simulate_options(arguments, plan);
-  asked.cut_box = cut_box(arguments, plan, chosen.voxels.body);
-  chosen.simulated = simulate::simulate(chosen.voxels.body, job.scene, asked, inner);
-  std::optional<simulate::StressBar> stress = chosen.simulated.error_bars.von_mises;
-  chosen.simulated.error_bars = bars;
-  chosen.simulated.error_bars.von_mises = std::move(stress);
+  const StopAfter limit(0.5 * seconds_left(), "the closer look");
+  try {
+    voxelize::VoxelizeResult voxels = voxelize::voxelize(surface, how, inner);
+    Job job = plan.job;
+    add_actions(job, voxels.body);
+    simulate::SimulateOptions asked = simulate_options(arguments, plan);
+    asked.failed_output.clear();  // there is a result
+    asked.cut_box = cut_box(arguments, plan, voxels.body);
+    simulate::SimulateResult again = simulate::simulate(voxels.body, job.scene, asked, inner);
+    std::optional<simulate::StressBar> stress = std::move(again.error_bars.von_mises);
+    again.error_bars = std::move(chosen.simulated.error_bars);
+    again.error_bars.von_mises = std::move(stress);
+    chosen.voxels = std::move(voxels);
+    chosen.simulated = std::move(again);
+  } catch (const TimeoutError&) {
+    if (!limit.passed()) throw;
+    chosen.simulated.no_local_stress = "it did not end in half of the time that was left";
+  }
   (void)told.take();
   return chosen;
 }

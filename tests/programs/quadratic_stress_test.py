@@ -169,6 +169,9 @@ def test_a_closer_look_is_refused_by_name():
     write("linked.toml", linked)
     expect_error(run("flexel", "deform", part, "--scene", "linked.toml", "--size", "4 mm", "--refine-stress", "-o", "bent.stl"), "flexel",
                  "the closer look at the largest stress does not take rigid links and rigid parts")
+    # before the search for a size, which would be stopped
+    expect_error(run("flexel", "deform", part, "--scene", "linked.toml", "--accuracy", "0.001%", "--timeout", "30s", "--refine-stress", "-o", "bent.stl"), "flexel",
+                 "the closer look at the largest stress does not take rigid links and rigid parts")
 
 
 def test_nafems_le1():
