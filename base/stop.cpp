@@ -8,7 +8,6 @@
 #include <ctime>
 
 #include "base/error.h"
-#include "base/time_left.h"
 
 namespace flexel {
 namespace {
@@ -23,11 +22,6 @@ std::int64_t time_after(double seconds) {
   constexpr double kLongest = 1e9;  // s
   if (!(seconds < kLongest)) return stop_detail::kNever;
   return stop_detail::now() + static_cast<std::int64_t>(1e9 * std::max(seconds, 0.0));
-}
-
-double seconds_until(std::int64_t limit) {
-  return limit == stop_detail::kNever ? std::numeric_limits<double>::infinity()
-                                      : 1e-9 * static_cast<double>(limit - stop_detail::now());
 }
 
 }  // namespace
@@ -86,11 +80,8 @@ StopAfter::~StopAfter() {
 }
 
 double StopAfter::seconds_left() const noexcept {
-  return seconds_until(limit_);
-}
-
-double seconds_left() noexcept {
-  return seconds_until(stop_detail::nearest_limit);
+  return limit_ == stop_detail::kNever ? std::numeric_limits<double>::infinity()
+                                       : 1e-9 * static_cast<double>(limit_ - stop_detail::now());
 }
 
 StopWaits::StopWaits() {

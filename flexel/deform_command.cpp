@@ -18,7 +18,6 @@
 #include "base/program/termination.h"
 #include "base/resources.h"
 #include "base/stop.h"
-#include "base/time_left.h"
 #include "base/units.h"
 #include "flexel/accuracy/resolution_search.h"
 #include "flexel/accuracy/run_error.h"
@@ -613,7 +612,7 @@ SolvedRun with_closer_look(const DeformArguments& arguments, const Plan& plan, c
   Progress inner("flexel", Progress::Mode::quiet);
   voxelize::VoxelizeOptions how = plan.job.voxelize;
   how.size = chosen.size;
-  const StopAfter limit(0.5 * seconds_left(), "the closer look");
+  const StopAfter limit(0.5 * time_left(), "the closer look");
   try {
     voxelize::VoxelizeResult voxels = voxelize::voxelize(surface, how, inner);
     Job job = plan.job;

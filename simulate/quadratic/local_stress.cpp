@@ -17,8 +17,8 @@
 #include "base/human.h"
 #include "base/math/area_vector.h"
 #include "base/program/progress.h"
+#include "base/resources.h"
 #include "base/stop.h"
-#include "base/time_left.h"
 #include "simulate/estimate/stress_singularity.h"
 #include "simulate/linear/conjugate_gradients.h"
 #include "simulate/linear/vector_products.h"
@@ -413,7 +413,7 @@ class CloserLook {
 
   // At the largest stress, and where there may be more, in a share of the time that is left: what was found is to be told.
   void look_around() {
-    const StopAfter limit(kShareOfTime * seconds_left(), "the closer look");
+    const StopAfter limit(kShareOfTime * time_left(), "the closer look");
     try {
       for (std::size_t n = 0; n < kMostPlaces; ++n) {
         const std::optional<Candidate> next = next_place();
@@ -427,8 +427,8 @@ class CloserLook {
           give_up(*next);
         }
       }
-    } catch (
-        const TimeoutError&) {  // what was found counts; a limit of the whole command ends what comes next
+    } catch (const TimeoutError&) {
+      // what was found counts; a limit of the whole command ends what comes next
       if (places_.empty()) throw TimeoutError("it did not end in half of the time that was left");
     }
   }

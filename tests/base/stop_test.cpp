@@ -4,10 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <limits>
 #include <thread>
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/resources.h"
 
 namespace flexel {
 namespace {
@@ -49,6 +51,19 @@ TEST(Stop, TheOutermostLimitThatIsOverIsNamed) {
     EXPECT_THAT([] { check_stop(); }, ThrowsMessage<TimeoutError>("stopped by --timeout"));
   }
   EXPECT_TRUE(outer.passed());
+}
+
+TEST(Stop, TheTimeLeftIsThatOfTheNearestLimit) {
+  EXPECT_EQ(time_left(), std::numeric_limits<double>::infinity());
+  const StopAfter outer(100, "--timeout");
+  {
+    const StopAfter inner(0.02, "--within");
+    EXPECT_LE(time_left(), inner.seconds_left() + 0.01);
+    sleep_for(0.05);
+    EXPECT_LE(time_left(), 0);
+  }
+  EXPECT_GT(time_left(), 50);
+  EXPECT_LE(time_left(), 100.01);
 }
 
 TEST(Stop, AnInnerLimitLeavesTheOuterOneAsItWas) {
