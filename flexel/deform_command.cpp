@@ -623,7 +623,7 @@ SolvedRun with_closer_look(const DeformArguments& arguments, const Plan& plan, c
     simulate::SimulateResult again = simulate::simulate(voxels.body, job.scene, asked, inner);
     std::optional<simulate::StressBar> stress = std::move(again.error_bars.von_mises);
     again.error_bars = std::move(chosen.simulated.error_bars);
-    again.error_bars.von_mises = std::move(stress);
+    if (stress) again.error_bars.von_mises = std::move(stress);  // else time ended the run before its bars
     chosen.voxels = std::move(voxels);
     chosen.simulated = std::move(again);
   } catch (const TimeoutError&) {
