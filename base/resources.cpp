@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "base/error.h"
+#include "base/stop.h"
 #include "base/units.h"
 
 namespace flexel {
@@ -68,6 +69,12 @@ void check_elements(double elements, const std::string& where) {
       where, fmt::format("{} elements are more than --max-elements {}: take a larger spacing, or raise it",
                          human_count(static_cast<std::size_t>(std::min(elements, 1e18))),
                          human_count(static_cast<std::size_t>(most_elements))));
+}
+
+double time_left() noexcept {
+  const std::int64_t limit = stop_detail::nearest_limit.load(std::memory_order_relaxed);
+  return limit == stop_detail::kNever ? std::numeric_limits<double>::infinity()
+                                      : 1e-9 * static_cast<double>(limit - stop_detail::now());
 }
 
 }  // namespace flexel

@@ -1,4 +1,4 @@
-// What this process may take: memory and elements (--max-memory, --max-elements; base/program/arguments.h).
+// What this process may take: memory, elements and time (--max-memory, --max-elements, --timeout; base/program/arguments.h).
 #pragma once
 #include <cstddef>
 #include <string>
@@ -21,5 +21,9 @@ void limit_elements(std::size_t elements);
 [[nodiscard]] double element_limit();  // infinite: none
 // Throws InputError(where, ...): `elements` are more than the limit. For estimates before the work, and for what a file says.
 void check_elements(double elements, const std::string& where);
+
+// s, until the nearest time limit (base/stop.h), whoever set it: for work that is worth only a share of it. Infinite without one,
+// below zero once it is over.
+[[nodiscard]] double time_left() noexcept;
 
 }  // namespace flexel

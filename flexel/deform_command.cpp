@@ -2,6 +2,7 @@
 // is found before the first stage runs, and nothing is written before the last has ended.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -374,6 +375,7 @@ class GoalRuns {
         return run;
       }
       usual_size_ = made(size).size;
+      if (arguments_.closer) refuse_scene_of_closer_look(made_->voxels.body);
       model_.choose(made_->voxels);
       if (model_.chosen()) return size_of(made(size));
       return size_of(*made_);
@@ -496,6 +498,12 @@ class GoalRuns {
     return static_cast<std::size_t>(std::clamp(allowed, 1.0, static_cast<double>(count)));
   }
 
+  void refuse_scene_of_closer_look(const Body& body) const {
+    Job job = plan_.job;
+    add_actions(job, body);
+    simulate::refuse_closer_look(body, job.scene);
+  }
+
   static SolvedRun size_of(const SolvedRun& made) {
     SolvedRun run;
     run.size = made.size;
@@ -597,7 +605,8 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
   return run;
 }
 
-// The run that was chosen again, with a closer look at its largest stress. Its bars stay, which other sizes may have widened.
+// The run that was chosen again, with a closer look at its largest stress. Its bars stay, which other sizes may have widened; so does it
+// where that takes more than half of the time left.
 SolvedRun with_closer_look(const DeformArguments& arguments, const Plan& plan, const Surface& surface,
                            SolvedRun chosen, Progress& progress) {
   HeldWarnings told;  // by the run that was chosen
@@ -605,20 +614,28 @@ SolvedRun with_closer_look(const DeformArguments& arguments, const Plan& plan, c
   constexpr double kVoxelized = 0.1;  // of the time
   voxelize::VoxelizeOptions how = plan.job.voxelize;
   how.size = chosen.size;
-  const simulate::ErrorBars bars = std::move(chosen.simulated.error_bars);
-  {
-    ProgressStretch voxelizing(progress, 0, kVoxelized);
-    chosen.voxels = voxelize::voxelize(surface, how, voxelizing.inner());
+  const StopAfter limit(0.5 * time_left(), "the closer look");
+  try {
+    voxelize::VoxelizeResult voxels = [&] {
+      ProgressStretch voxelizing(progress, 0, kVoxelized);
+      return voxelize::voxelize(surface, how, voxelizing.inner());
+    }();
+    Job job = plan.job;
+    add_actions(job, voxels.body);
+    simulate::SimulateOptions asked = simulate_options(arguments, plan);
+    asked.failed_output.clear();  // there is a result
+    asked.cut_box = cut_box(arguments, plan, voxels.body);
+    ProgressStretch solving(progress, kVoxelized, 1);
+    simulate::SimulateResult again = simulate::simulate(voxels.body, job.scene, asked, solving.inner());
+    const std::optional<simulate::StressBar> stress = again.error_bars.von_mises;
+    again.error_bars = std::move(chosen.simulated.error_bars);
+    if (stress) again.error_bars.von_mises = stress;  // else time ended the run before its bars
+    chosen.voxels = std::move(voxels);
+    chosen.simulated = std::move(again);
+  } catch (const TimeoutError&) {
+    if (!limit.passed()) throw;
+    chosen.simulated.no_local_stress = "it did not end in half of the time that was left";
   }
-  Job job = plan.job;
-  add_actions(job, chosen.voxels.body);
-  simulate::SimulateOptions asked = simulate_options(arguments, plan);
-  asked.cut_box = cut_box(arguments, plan, chosen.voxels.body);
-  ProgressStretch solving(progress, kVoxelized, 1);
-  chosen.simulated = simulate::simulate(chosen.voxels.body, job.scene, asked, solving.inner());
-  std::optional<simulate::StressBar> stress = chosen.simulated.error_bars.von_mises;
-  chosen.simulated.error_bars = bars;
-  chosen.simulated.error_bars.von_mises = std::move(stress);
   (void)told.take();
   return chosen;
 }
@@ -872,9 +889,8 @@ int flex_command(int argc, char** argv) {
 Deformed deform(const std::vector<std::string>& arguments, const Surface* part, Progress::Mode mode) {
   std::vector<std::string> words = {"deform"};
   words.insert(words.end(), arguments.begin(), arguments.end());
-  std::vector<char*> pointers;
-  for (std::string& word : words) pointers.push_back(word.data());
-  pointers.push_back(nullptr);
+  std::vector<char*> pointers(words.size() + 1, nullptr);
+  std::transform(words.begin(), words.end(), pointers.begin(), [](std::string& word) { return word.data(); });
   DeformArguments given;
   given.needs_output = false;
   given.part = part;

@@ -80,6 +80,13 @@ std::string stress_bar_of(const SimulateResult& result) {
                      human_pressure(found->value[0]));
 }
 
+// Of the share of yield, which is in proportion to the largest stress; nothing where either has none.
+std::optional<double> yield_share_bar(const SimulateResult& result) {
+  const std::optional<StressBar>& bar = result.error_bars.von_mises;
+  if (!bar || !bar->bar || !result.stress->yield_share || !(result.stress->value > 0)) return std::nullopt;
+  return *result.stress->yield_share * bar->bar->half_width / result.stress->value;
+}
+
 // "looked at closer at 1 place, 1,204 cells in 1.3 s: 25.5 MPa, 27.1 MPa, 27.3 MPa down to cells of 0.6 mm"
 std::string local_stress_line(const SimulateResult& result) {
   if (!result.no_local_stress.empty())
@@ -335,6 +342,8 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
     if (!result.stress->beside.empty()) json["largest_von_mises_beside"] = result.stress->beside;
     if (result.stress->thin_walls > 0) json["largest_von_mises_thin_walls"] = result.stress->thin_walls;
     if (result.stress->yield_share) json["largest_von_mises_yield_share"] = *result.stress->yield_share;
+    if (const std::optional<double> bar = yield_share_bar(result))
+      json["largest_von_mises_yield_share_bar"] = *bar;
     if (result.local_stress) json["largest_von_mises_local"] = local_stress_json(*result.local_stress);
     if (!result.no_local_stress.empty()) json["largest_von_mises_local_none"] = result.no_local_stress;
   }

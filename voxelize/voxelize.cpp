@@ -36,6 +36,7 @@ constexpr std::size_t kDefaultCount = 20000;
 
 std::vector<PartExtent> extents_of(const std::vector<HealedPart>& parts) {
   std::vector<PartExtent> extents;
+  extents.reserve(parts.size());
   for (const HealedPart& part : parts)
     extents.push_back({std::abs(enclosed_volume(part.mesh)), surface_area(part.mesh)});
   return extents;

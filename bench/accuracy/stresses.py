@@ -354,10 +354,9 @@ def run_closer(folder, name, case, size):
     return row
 
 
-def closer_section(results):
-    text = (f"{CLOSER}\n\n`flexel deform --refine-stress` ([local-stress.md](../theory/local-stress.md)) beside `flexel deform` without it, on coarse lattices aligned to the\n"
-            "part. Seconds: the whole process, bars included; cells more: of all finer lattices together.\n\n"
-            "| case | reference MPa | size mm | cells | error % | bar % | s | closer: error % | bar % | holds | cells more | s |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n")
+def closer_table(results):
+    """Its lines; the bars' widths in %, how many hold, the largest error."""
+    text = ("| case | reference MPa | size mm | cells | error % | bar % | s | closer: error % | bar % | holds | cells more | s |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n")
     widths, held, worst = [], 0, 0
     for name, (true, rows) in results.items():
         for size, (cells, value, bar, seconds, _), (_, closer, narrow, longer, more) in rows:
@@ -367,7 +366,13 @@ def closer_section(results):
             held, worst = held + bool(holds), max(worst, abs(closer / true - 1))
             text += (f"| {name} | {true / 1e6:.4g} | {size} | {cells:,} | {100 * (value / true - 1):+.1f} | {share(bar, value)} | {seconds:.1f} | "
                      f"{100 * (closer / true - 1):+.1f} | {share(narrow, closer)} | {'yes' if holds else 'no' if narrow else ''} | {more:,} | {longer:.1f} |\n")
-    return text + f"\n{held} of {len(widths)} bars hold; their median is {statistics.median(widths):.1f} %, the largest error {100 * worst:.1f} %.\n"
+    return text, widths, held, worst
+
+
+def closer_section(results):
+    text, widths, held, worst = closer_table(results)
+    return (f"{CLOSER}\n\n`flexel deform --refine-stress` ([local-stress.md](../theory/local-stress.md)) beside `flexel deform` without it, on coarse lattices aligned to the\n"
+            f"part. Seconds: the whole process, bars included; cells more: of all finer lattices together.\n\n{text}\n{held} of {len(widths)} bars hold; their median is {statistics.median(widths):.1f} %, the largest error {100 * worst:.1f} %.\n")
 
 
 def measure_closer(options, in_a_folder):
@@ -375,7 +380,7 @@ def measure_closer(options, in_a_folder):
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
         runs = {(name, size): pool.submit(in_a_folder, run_closer, name, case, size) for name, case in chosen.items() for size in CLOSER_SIZES[name]}
         true = {name: pool.submit(in_a_folder, reference, name, case[5]) for name, case in chosen.items()}
-        return closer_section({name: (true[name].result(), [runs[name, size].result() for size in CLOSER_SIZES[name]]) for name in chosen})
+        return {name: (true[name].result(), [runs[name, size].result() for size in CLOSER_SIZES[name]]) for name in chosen}
 
 
 def table(results):
@@ -425,13 +430,22 @@ def main():
     arguments.add_argument("--random", type=int, default=0, metavar="COUNT", help="add so many cases, of measures and sizes by chance")
     arguments.add_argument("--jobs", type=int, default=1, help="cases at a time")
     arguments.add_argument("--closer", action="store_true", help="the section of the closer look alone")
+    arguments.add_argument("--closer-table", metavar="CASE", help="print that section's table of one case, and write nothing")
+    arguments.add_argument("--list", action="store_true", help="print the cases of that section")
     options = arguments.parse_args()
+    if options.list:
+        print("\n".join(CLOSER_SIZES))
+        return 0
 
     def in_a_folder(function, *words):
         with tempfile.TemporaryDirectory() as place:
             return function(pathlib.Path(place), *words)
 
-    closer = measure_closer(options, in_a_folder)
+    if options.closer_table:
+        options.only = [options.closer_table]
+        print(closer_table(measure_closer(options, in_a_folder))[0], end="")
+        return 0
+    closer = closer_section(measure_closer(options, in_a_folder))
     if options.closer:
         page = options.output.read_text(encoding="utf-8") if options.output.exists() else ""
         write(options.output, page.split(CLOSER)[0].rstrip("\n") + "\n\n" + closer)

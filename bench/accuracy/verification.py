@@ -5,7 +5,7 @@
 
 Always: the lattice tested as a material (`flexel measure`), the paper's cantilever against its reference and a thick tube against Lame's
 solution, each at several spacings with its error bar. Without --quick also the tables of accuracy_table and error_bars (a
-build with FLEXEL_BENCH=ON), of bench/accuracy/laws.py, step_parts.py and calculix.py (ccx and gmsh). A section whose programs or
+build with FLEXEL_BENCH=ON), of bench/accuracy/laws.py, stresses.py, step_parts.py and calculix.py (ccx and gmsh). A section whose programs or
 parts are not there says so. With --keep every case is written to FOLDER as soon as it is done, and a later run takes it from there: a run
 of half an hour can be stopped and goes on. Figures are SVG by gnuplot, in a folder beside FILE named after it. Exit code 1 when a true error lies outside
 its bar in more than one case of ten, or a material is off by more than 1 %.
@@ -176,7 +176,7 @@ def shortfalls(table):
     parts = {}
     for line in table.splitlines():
         cells = [cell.strip() for cell in line.strip("|").split("|")]
-        if len(cells) == 8 and re.fullmatch(r"[+-]\d+\.\d+", cells[3]):
+        if len(cells) == 9 and re.fullmatch(r"[+-]\d+\.\d+", cells[3]):
             parts.setdefault(cells[0], []).append((cells[1], float(cells[3]), float(cells[5] or 0) + float(cells[6])))
     for part, rows in parts.items():
         far += [f"- {part}, {by[8:]}: {error:+.2f} %" for by, error, _ in rows if by.startswith("Flexel") and abs(error) > 5]
@@ -225,6 +225,9 @@ def main():
                       ("Error bars", "Cases whose answer is known ([error-bars.md](../theory/error-bars.md)).", ["error_bars"]),
                       ("Elastic laws", "A bar of 100 x 20 x 20 mm, held at one end and pushed at the other, beside second-order tetrahedra of 3 mm by CalculiX\n"
                        "([laws.md](../theory/laws.md)); \"in time\": the same scene with damping until it is at rest.", [HERE / "laws.py"], ["ccx", "gmsh"]),
+                      ("Peak stresses", "The largest von Mises stress of model `quadratic` without and with `--refine-stress` ([local-stress.md](../theory/local-stress.md)), beside\n"
+                       "CalculiX or Lame. Seconds: the whole process, bars included; cells more: of all finer lattices together.",
+                       [HERE / "stresses.py", "--closer-table"], ["ccx"], lambda: command(HERE / "stresses.py", "--list").splitlines()),
                       ("STEP parts", "Every closed STEP part with an error bar, nothing set by hand; processor seconds.",
                        [HERE / "step_parts.py", "--parts", options.parts, "--cells", "30000,300000"], [options.parts],
                        lambda: command(HERE / "step_parts.py", "--list").split()),

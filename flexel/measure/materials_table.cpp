@@ -1,8 +1,7 @@
 // The library of materials written out.
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
+#include "base/json.h"
 #include "base/units.h"
 #include "flexel/measure/materials_table.h"
 #include "simulate/input/materials.h"
@@ -106,7 +105,7 @@ std::string materials_json() {
     each["source"] = source_of(material);
     list.push_back(each);
   }
-  return list.dump(2) + "\n";
+  return json_text(list, 2) + "\n";
 }
 
 }  // namespace flexel::commands

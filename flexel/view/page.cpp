@@ -245,7 +245,7 @@ Page make_page(const std::vector<ViewFile>& files, const PageOptions& options, b
                {"colours", colours_json()},
                {"units", units_json(files)},
                {"words", words_json(options.words)}};
-  if (!options.clay.empty()) json["clay"] = Json::parse(options.clay);
+  if (!options.clay.empty()) json["clay"] = parse_json(options.clay);
   if (options.exaggeration) json["scale"] = *options.exaggeration;
   json["files"] = Json::array();
   std::string data;

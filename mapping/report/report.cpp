@@ -271,7 +271,7 @@ Json report_object(const MapReport& report, const MapOptions& options) {
   json["volume_after"] = quality.volume_after;
   json["lattice_volume_before"] = report.lattice_volume_before;
   json["lattice_volume_after"] = report.lattice_volume_after;
-  json["crack"] = Json::parse(crack_json(report.crack));
+  json["crack"] = parse_json(crack_json(report.crack));
   return json;
 }
 

@@ -3,13 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <map>
-#include <set>
 #include <utility>
 
 #include "base/error.h"
@@ -17,6 +17,7 @@
 #include "base/math/area_vector.h"
 #include "base/math/dense.h"
 #include "base/program/progress.h"
+#include "base/resources.h"
 #include "base/stop.h"
 #include "simulate/estimate/stress_singularity.h"
 #include "simulate/linear/conjugate_gradients.h"
@@ -42,7 +43,11 @@ constexpr double kGrowsOn =
     0.7;  // of the last difference but one: values that come to a limit differ by less
 constexpr double kLeastFacetTurn = 0.0175;  // rad, between facets of a notch: less is a flat face
 constexpr double kLeastFacetWidth = 1e-3;   // spacings, of such facets: less is a sliver of the tessellation
+constexpr double kSeen = 4;                 // cells: the radius of a notch whose peak the whole's cells have
+constexpr double kSameRadius = 0.2;         // share: notches that coarse cells see alike,
+constexpr double kLieOtherwise = 0.3;       // share: but for how they lie among the cells
 constexpr double kResolved = 3;             // cells that a notch's radius has where its peak is seen
+constexpr double kShareOfTime = 0.5;        // of what a time limit leaves
 constexpr int kMostCorrections = 16;        // of a parent
 constexpr double kInBalance = 0.03;         // of the first one
 constexpr double kComing = 0.2;             // of the first one: where the corrections are used up
@@ -88,39 +93,62 @@ LatticeBox box_around(const QuadraticSystem& parent, const Vec3& at) {
 class FacesOnPlanes {
  public:
   FacesOnPlanes(const Surface& surface, const Lattice& lattice) {
-    for (std::size_t p = 0; p < surface.polygon_count(); ++p) {
+    for (std::uint32_t p = 0; p < surface.polygon_count(); ++p) {
       const auto corners = surface.polygon(p);
       const Vec3 normal = (lattice.axes.transpose() * area_vector(surface.vertices, corners)).normalized();
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const auto a = static_cast<Eigen::Index>(axis);
-        if (std::abs(normal[a]) > kAcross)
-          for (const std::uint32_t v : corners) at_[axis].insert(lattice.to_lattice(surface.vertices[v])[a]);
+      Eigen::Index axis = 0;
+      if (!(normal.cwiseAbs().maxCoeff(&axis) > kAcross)) continue;
+      Eigen::AlignedBox3d around;
+      for (const std::uint32_t v : corners) {
+        const Vec3 at = lattice.to_lattice(surface.vertices[v]);
+        around.extend(at);
+        at_[static_cast<std::size_t>(axis)].emplace(at[axis], around_.size());
       }
+      around_.push_back(around);
     }
   }
   // Moves faces of the box, of a lattice `times` as fine and inside of `range`, outwards until they are clear of them.
   void keep_clear(std::int32_t times, const VoxelRange* range, LatticeBox& box) const {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto a = static_cast<Eigen::Index>(axis);
-      std::int32_t &lower = box.lower[axis], &upper = box.upper[axis];
-      for (int n = 0; n < kMostSteps && lies_on(axis, lower, times); ++n)
-        if (range == nullptr || lower > range->lower[a]) --lower;
-      for (int n = 0; n < kMostSteps && lies_on(axis, upper, times); ++n)
-        if (range == nullptr || upper < range->upper[a]) ++upper;
-      if (lies_on(axis, lower, times) || lies_on(axis, upper, times))
-        throw InputError("faces of the part lie in every plane of cells around the place that is looked at");
+    bool moved = true;
+    for (int n = 0; n < kMostSteps && moved; ++n) {
+      moved = false;  // what is on one side may come to another with a side that moves
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const auto a = static_cast<Eigen::Index>(axis);
+        std::int32_t &lower = box.lower[axis], &upper = box.upper[axis];
+        if (lies_on(axis, lower, times, box) && (range == nullptr || lower > range->lower[a])) {
+          --lower;
+          moved = true;
+        }
+        if (lies_on(axis, upper, times, box) && (range == nullptr || upper < range->upper[a])) {
+          ++upper;
+          moved = true;
+        }
+      }
     }
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (lies_on(axis, box.lower[axis], times, box) || lies_on(axis, box.upper[axis], times, box))
+        throw InputError("faces of the part lie in every plane of cells around the place that is looked at");
   }
 
  private:
   static constexpr double kAcross = 0.9;  // of a normal, along the axis
   static constexpr double kOn = 0.02;     // spacings: slivers of less matter are no cells
-  static constexpr int kMostSteps = 3;
-  [[nodiscard]] bool lies_on(std::size_t axis, std::int32_t plane, std::int32_t times) const {
-    const auto found = at_[axis].lower_bound((plane - kOn) / times);
-    return found != at_[axis].end() && *found <= (plane + kOn) / times;
+  static constexpr int kMostSteps = 6;
+  // A face lies on the box's side in that plane.
+  [[nodiscard]] bool lies_on(std::size_t axis, std::int32_t plane, std::int32_t times,
+                             const LatticeBox& box) const {
+    Eigen::AlignedBox3d side;
+    for (const Index3& end : {box.lower, box.upper}) side.extend(Vec3(end[0], end[1], end[2]) / times);
+    const auto a = static_cast<Eigen::Index>(axis);
+    side.min()[a] = -std::numeric_limits<double>::infinity();
+    side.max()[a] = std::numeric_limits<double>::infinity();
+    for (auto found = at_[axis].lower_bound((plane - kOn) / times);
+         found != at_[axis].end() && found->first <= (plane + kOn) / times; ++found)
+      if (around_[found->second].intersects(side)) return true;
+    return false;
   }
-  std::array<std::set<double>, 3> at_;  // lattice coordinates of the whole
+  std::array<std::multimap<double, std::size_t>, 3> at_;  // lattice coordinates of the whole -> of around_
+  std::vector<Eigen::AlignedBox3d> around_;               // faces across an axis
 };
 
 // Where a submodel's field counts: a cell of its parent away from the cut faces.
@@ -241,6 +269,7 @@ struct LookedPlace {
   double doubt_of_whole = 0;   // Pa
   bool grows_on = false;       // the values do not come to a limit
   double spacing = 0;          // m, of the finest cells
+  double radius = 0;           // m, of the smallest notch around; infinite: there is none
   std::string beside;          // of singular_beside()
   std::size_t cells = 0;       // of all submodels
   // Lattice coordinates of the whole: where the first look counts, and the last one
@@ -262,16 +291,19 @@ struct Candidate {
   Vec3 at = Vec3::Zero();
 };
 
-// A hole or fillet whose radius is below a cell, so that the whole's cells hardly see its peak.
+// A hole or fillet so small that the whole's cells see too little of its peak.
 struct SmallNotch {
   ReEntrantEdge edge;
   double radius = 0;  // m
 };
 
-// How many times as large as the stress of coarse cells its peak may be: three at a small round hole, more at the fillet of a step, whose
-// corner the coarse cells see as a sharp one.
+// How many times as large as the stress of coarse cells its peak may be, of what was measured: near 3 at the smallest holes, more at the fillet of a step,
+// whose corner the coarse cells see as a sharp one; 1.6 at a radius of one cell, 1.3 at one and a quarter, 1.2 at two and a half.
 double concentration(double radius, double spacing) {
-  return std::max(1 + 2 * (1 - radius / spacing), std::sqrt(spacing / radius));
+  constexpr double kAtOneCell = 1.65, kSmallest = 3;
+  const double cells = radius / spacing;
+  if (cells > 1) return 1 + (kAtOneCell - 1) * std::max(0.0, kSeen - cells) / (kSeen - 1);
+  return std::max(kSmallest + (kAtOneCell - kSmallest) * cells, std::sqrt(1 / cells));
 }
 
 bool grows_on(const std::vector<double>& values) {
@@ -358,7 +390,8 @@ class CloserLook {
         continue;
       }
       facets_.push_back(edge);
-      if (radius < spacing() && edge.width > kLeastFacetWidth * spacing()) notches_.push_back({edge, radius});
+      if (radius < kSeen * spacing() && edge.width > kLeastFacetWidth * spacing())
+        notches_.push_back({edge, radius});
     }
     for (std::uint32_t e = 0; e < singular.size(); ++e)
       if (singular[e] >= 2) tied_.push_back(body().rest[e]);
@@ -366,18 +399,7 @@ class CloserLook {
 
   LocalStressField operator()() {
     const auto began = std::chrono::steady_clock::now();
-    for (std::size_t n = 0; n < kMostPlaces; ++n) {
-      const std::optional<Candidate> next = next_place();
-      if (!next) break;
-      progress_.update(static_cast<double>(n) / kMostPlaces, fmt::format("place {}", n + 1));
-      try {
-        places_.push_back(look(*next));
-      } catch (const InputError&) {
-        give_up(*next);
-      } catch (const DivergedError&) {
-        give_up(*next);
-      }
-    }
+    look_around();
     LocalStressField made;
     sum_up(made);
     made.field = std::move(merged_);
@@ -388,6 +410,28 @@ class CloserLook {
  private:
   [[nodiscard]] const Body& body() const { return system_.problem().body; }
   [[nodiscard]] double spacing() const { return lattice_of(system_).spacing.maxCoeff(); }
+
+  // At the largest stress, and where there may be more, in a share of the time that is left: what was found is to be told.
+  void look_around() {
+    const StopAfter limit(kShareOfTime * time_left(), "the closer look");
+    try {
+      for (std::size_t n = 0; n < kMostPlaces; ++n) {
+        const std::optional<Candidate> next = next_place();
+        if (!next) return;
+        progress_.update(static_cast<double>(n) / kMostPlaces, fmt::format("place {}", n + 1));
+        try {
+          places_.push_back(look(*next));
+        } catch (const InputError&) {
+          give_up(*next);
+        } catch (const DivergedError&) {
+          give_up(*next);
+        }
+      }
+    } catch (const TimeoutError&) {
+      // what was found counts; a limit of the whole command ends what comes next
+      if (places_.empty()) throw TimeoutError("it did not end in half of the time that was left");
+    }
+  }
 
   // Called where an error is handled: without a first place there is none.
   void give_up(const Candidate& at) {
@@ -435,7 +479,7 @@ class CloserLook {
     for (const SmallNotch& each : notches_)
       for (std::size_t i = 0; i < 2; ++i) {
         const double value = von_mises(merged_.vertex[each.edge.vertices[i]]);
-        add(value, concentration(each.radius, spacing()) * value, 0, each.edge.ends[i]);
+        add(value, growth(each.radius) * value, 0, each.edge.ends[i]);
       }
     std::sort(above.begin(), above.end(),
               [](const Candidate& a, const Candidate& b) { return a.may_be > b.may_be; });
@@ -444,6 +488,19 @@ class CloserLook {
       if (!is_singular(each.at)) return each;
     }
     return std::nullopt;
+  }
+  // How many times what the run's cells have at a notch the stress there may be: as at those of its radius that were looked at, the less beyond the more
+  // these are; else as any notch.
+  [[nodiscard]] double growth(double radius) const {
+    const double any = concentration(radius, spacing());
+    double most = 0;
+    int alike = 0;
+    for (const LookedPlace& each : places_) {
+      if (!each.beside.empty() || !(std::abs(each.radius / radius - 1) < kSameRadius)) continue;
+      ++alike;
+      most = std::max(most, each.largest.value / each.values.front());
+    }
+    return alike == 0 ? any : std::min(any, most * (1 + kLieOtherwise / (alike + 1)));
   }
   // Of a stress of the run's own cells: without what they have too large. A place that is less in doubt than the first one was counts less too
   // large: a field that the run's cells hold, as along an even bar, is as it is.
@@ -461,7 +518,7 @@ class CloserLook {
              return distance_to(each, at) <= (beyond_ ? kClear * spacing() : reach);
            });
   }
-  // m: the smallest of holes and fillets around, of those below a cell.
+  // m: the smallest of holes and fillets around, of the small ones.
   [[nodiscard]] double notch_radius(const Vec3& at) const {
     double least = std::numeric_limits<double>::infinity();
     for (const SmallNotch& each : notches_)
@@ -477,9 +534,9 @@ class CloserLook {
     return widest;
   }
 
-  // Cells show the peak of a notch of this radius [m].
-  [[nodiscard]] static bool is_resolved(const LookedPlace& place, double radius) {
-    return radius >= kResolved * place.spacing;
+  // Its cells show the peak of the smallest notch there.
+  [[nodiscard]] static bool is_resolved(const LookedPlace& place) {
+    return place.radius >= kResolved * place.spacing;
   }
 
   // The place of the largest stress; then those where it may be larger still.
@@ -512,49 +569,72 @@ class CloserLook {
     place.values.push_back(from.value);
     place.doubt_of_whole = from.doubt;
     place.largest = {from.value, from.at, 0, 0};
-    const double radius = notch_radius(from.at);
-    const bool turns = !solution_.turn.empty();
-    std::vector<std::unique_ptr<Submodel>> models;
-    ParentField parent{system_, *solution_.tangent, solution_.safety, turns, solution_.displacement};
-    std::int32_t times = 1;
-    std::optional<ParentField> next;
-    for (std::size_t n = 0; n < kMostLooks; ++n) {
-      // cells smaller than the facets see their edges, and tell nothing of the shape that these stand for
-      const double coming = spacing() / (kRatio * times);
-      if (coming < facet_width(place.largest.at, kRatio * coming)) {
-        if (n == 0) throw InputError("the facets of the surface there are as wide as its cells");
-        break;
+    place.radius = notch_radius(from.at);
+    Descent descent{
+        {},
+        {system_, *solution_.tangent, solution_.safety, !solution_.turn.empty(), solution_.displacement},
+        {},
+        1};
+    const auto stands = [&] { return place.values.size() > 1 && is_resolved(place); };
+    try {
+      while (descent.models.size() < kMostLooks && look_finer(descent, place)) {
       }
-      ParentField& above = next ? *next : parent;
-      LatticeBox box = box_around(above.system, place.largest.at);
-      faces_.keep_clear(times, above.system.box(), box);
-      Submodel own(above.system, cut_(Submodel::finer(box, 1)), box, 1, scene_);
-      models.push_back(
-          std::make_unique<Submodel>(above.system, cut_(Submodel::finer(box, kRatio)), box, kRatio, scene_));
-      Submodel& fine = *models.back();
-      refuse_beyond_memory(quadratic_memory(body(), 0).bytes + quadratic_memory(fine.body(), 0).bytes,
-                           "a closer look at the largest stress", scene_.name);
-      couple(above, fine, own);
-      if (n > 0) models[n - 1]->forget();
-      times *= kRatio;
-      if (!take(fine, times, radius, place)) break;
-      if (n == 0) place.first_core = place.last_core;
-      if (!place.beside.empty()) break;
-      const bool resolved = is_resolved(place, radius);
-      if (resolved && place.values.size() > 2 && place.bar->half_width <= kNarrow * place.largest.value)
-        break;
-      // surely not the largest
-      if (resolved && !places_.empty() && place.largest.value + place.bar->half_width < best().largest.value)
-        break;
-      next.emplace(ParentField{fine.system(), *fine.solution().tangent, fine.solution().safety, turns,
-                               fine.solution().displacement});
+    } catch (const InputError&) {  // what coarser boxes found counts where they see the peak
+      if (!stands()) throw;
+    } catch (const DivergedError&) {
+      if (!stands()) throw;
+    } catch (const TimeoutError&) {
+      if (!stands()) throw;
     }
     return place;
   }
 
-  // What a submodel says of the place; false where it is less sure than the one before though that saw a notch of this radius [m]: its
+  // The boxes at one place, one in the other.
+  struct Descent {
+    std::vector<std::unique_ptr<Submodel>> models;
+    ParentField whole;
+    std::optional<ParentField> last;  // the field of the last box
+    std::int32_t times = 1;           // as fine as the whole
+  };
+
+  // The next box; false where it is the last.
+  bool look_finer(Descent& descent, LookedPlace& place) {
+    const bool first = descent.models.empty();
+    // cells smaller than the facets see their edges, and tell nothing of the shape that these stand for
+    const double coming = spacing() / (kRatio * descent.times);
+    if (coming < facet_width(place.largest.at, kRatio * coming)) {
+      if (first) throw InputError("the facets of the surface there are as wide as its cells");
+      return false;
+    }
+    ParentField& above = first ? descent.whole : *descent.last;
+    LatticeBox box = box_around(above.system, place.largest.at);
+    faces_.keep_clear(descent.times, above.system.box(), box);
+    Submodel own(above.system, cut_(Submodel::finer(box, 1)), box, 1, scene_);
+    descent.models.push_back(
+        std::make_unique<Submodel>(above.system, cut_(Submodel::finer(box, kRatio)), box, kRatio, scene_));
+    Submodel& fine = *descent.models.back();
+    refuse_beyond_memory(quadratic_memory(body(), 0).bytes + quadratic_memory(fine.body(), 0).bytes,
+                         "a closer look at the largest stress", scene_.name);
+    couple(above, fine, own);
+    if (!first) descent.models[descent.models.size() - 2]->forget();
+    descent.times *= kRatio;
+    if (!take(fine, descent.times, place)) return false;
+    if (first) place.first_core = place.last_core;
+    if (!place.beside.empty()) return false;
+    const bool resolved = is_resolved(place);
+    if (resolved && place.values.size() > 2 && place.bar->half_width <= kNarrow * place.largest.value)
+      return false;
+    // surely not the largest
+    if (resolved && !places_.empty() && place.largest.value + place.bar->half_width < best().largest.value)
+      return false;
+    descent.last.emplace(ParentField{fine.system(), *fine.solution().tangent, fine.solution().safety,
+                                     descent.whole.turns, fine.solution().displacement});
+    return true;
+  }
+
+  // What a submodel says of the place; false where it is less sure than the one before though that saw the notch: its
   // cells see the edges of the surface's facets, or what has no limit.
-  bool take(const Submodel& fine, std::int32_t times, double radius, LookedPlace& place) {
+  bool take(const Submodel& fine, std::int32_t times, LookedPlace& place) {
     State state;
     state.displacement = element_displacement(fine.system(), fine.solution());
     const VoxelRange core = core_of(fine);
@@ -576,7 +656,7 @@ class CloserLook {
     now.grows_on = grows_on(now.values);
     place.cells = now.cells;
     place.grows_on = now.grows_on;
-    if (now.beside.empty() && now.values.size() > 3 && is_resolved(place, radius) &&
+    if (now.beside.empty() && now.values.size() > 3 && is_resolved(place) &&
         now.bar->half_width > place.bar->half_width)
       return false;
     place = now;

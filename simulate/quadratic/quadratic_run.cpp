@@ -149,10 +149,13 @@ void share_time(const std::vector<ActiveEffect>& effects, double solving, bool e
   explain_times(shares, result.seconds, progress);
 }
 
-void refuse_closer_look(const QuadraticSystem& system, const Scene& scene, const SimulateOptions& options) {
-  if (!options.cut_box) return;
+[[noreturn]] void refuse_closer_look_at(const std::string& what, const Scene& scene) {
+  throw InputError(scene.name, "the closer look at the largest stress does not take " + what);
+}
+
+void refuse_what_closer_look_lacks(const QuadraticSystem& system, const Scene& scene) {
   if (const std::string lacks = local_stress_lacks(system); !lacks.empty())
-    throw InputError(scene.name, "the closer look at the largest stress does not take " + lacks);
+    refuse_closer_look_at(lacks, scene);
 }
 
 // The largest stress on finer cells around it. What the run has stays where they cannot be solved.
@@ -183,6 +186,8 @@ void take_closer_look(const QuadraticSystem& system, const QuadraticSolution& so
   } catch (const InputError& error) {
     result.no_local_stress = error.what();
   } catch (const DivergedError& error) {
+    result.no_local_stress = error.what();
+  } catch (const TimeoutError& error) {  // a limit of the whole command ends what comes next
     result.no_local_stress = error.what();
   }
 }
@@ -273,6 +278,21 @@ QuadraticSolution quadratic_equilibrium(const QuadraticSystem& system, const Sce
   return solution;
 }
 
+void refuse_closer_look(const Body& body, const Scene& scene) {
+  const Problem problem{body,
+                        materials_of_parts(scene, body),
+                        stray_cells(find_fragments(body)),
+                        models_of_parts(scene, body),
+                        {},
+                        {},
+                        {},
+                        {}};
+  refuse_what_quadratic_lacks(scene, body, active_effects(scene.effects, problem));
+  if (scene.get<Thermal>().expands())  // its temperatures are not known yet
+    refuse_closer_look_at("heat and shrinkage", scene);
+  refuse_what_closer_look_lacks(QuadraticSystem(problem, scene), scene);
+}
+
 bool asks_for_quadratic(const Scene& scene) {
   return scene.model == "quadratic" ||
          std::any_of(scene.parts.begin(), scene.parts.end(),
@@ -309,7 +329,7 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   report_strays(fragments, result, progress);
   const QuadraticSystem system(problem, scene);
   refuse_too_large(system, body, scene.name);
-  refuse_closer_look(system, scene, options);
+  if (options.cut_box) refuse_what_closer_look_lacks(system, scene);
   for (const std::string& warning : system.warnings()) progress.warn(warning);
   refuse_loose_fragments(fragments, body, system.tied_elements(), system.bonded_elements(), scene.name);
   double solving = 0;

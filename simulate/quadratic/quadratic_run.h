@@ -20,6 +20,10 @@ namespace flexel::simulate {
 [[nodiscard]] SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptions& options,
                                            Progress& progress, double* linear_reach = nullptr);
 
+// Throws InputError where a closer look at the largest stress (simulate/quadratic/local_stress.h) does not take the scene,
+// or the model does not.
+void refuse_closer_look(const Body& body, const Scene& scene);
+
 class QuadraticSystem;     // simulate/quadratic/quadratic_system.h
 struct QuadraticSolution;  // simulate/quadratic/quadratic_solve.h
 

@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/parallel_sort.h"
+#include "base/resources.h"
 
 namespace flexel {
 namespace {
@@ -51,6 +52,19 @@ TEST(Stop, TheOutermostLimitThatIsOverIsNamed) {
     EXPECT_THAT([] { check_stop(); }, ThrowsMessage<TimeoutError>("stopped by --timeout"));
   }
   EXPECT_TRUE(outer.passed());
+}
+
+TEST(Stop, TheTimeLeftIsThatOfTheNearestLimit) {
+  EXPECT_EQ(time_left(), std::numeric_limits<double>::infinity());
+  const StopAfter outer(100, "--timeout");
+  {
+    const StopAfter inner(0.02, "--within");
+    EXPECT_LE(time_left(), inner.seconds_left() + 0.01);
+    sleep_for(0.05);
+    EXPECT_LE(time_left(), 0);
+  }
+  EXPECT_GT(time_left(), 50);
+  EXPECT_LE(time_left(), 100.01);
 }
 
 TEST(Stop, AnInnerLimitLeavesTheOuterOneAsItWas) {

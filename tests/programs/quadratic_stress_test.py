@@ -130,6 +130,7 @@ def test_a_closer_look_at_a_hole():
     found, bar = summary["largest_von_mises"], summary["error_bars"]["largest_von_mises"]["bar"]
     expect(abs(found / 27.43e6 - 1) < 0.03, found)
     expect(bar is not None and abs(found - 27.43e6) < bar < 0.05 * found, f"{found} +- {bar}")
+    expect(abs(summary["largest_von_mises_yield_share_bar"] / (bar / 100e6) - 1) < 1e-12, summary["largest_von_mises_yield_share_bar"])
     local = summary["largest_von_mises_local"]
     expect(local["values"][0] == found and local["values"][-1] < 0.9 * found, local)
     expect("looked at closer" in done.out.decode() + done.err, done)
@@ -168,6 +169,9 @@ def test_a_closer_look_is_refused_by_name():
     linked = MATERIAL + '[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = [0, 0, "-10 N"]\nlink = "rigid"\n'
     write("linked.toml", linked)
     expect_error(run("flexel", "deform", part, "--scene", "linked.toml", "--size", "4 mm", "--refine-stress", "-o", "bent.stl"), "flexel",
+                 "the closer look at the largest stress does not take rigid links and rigid parts")
+    # before the search for a size, which would be stopped
+    expect_error(run("flexel", "deform", part, "--scene", "linked.toml", "--accuracy", "0.001%", "--timeout", "30s", "--refine-stress", "-o", "bent.stl"), "flexel",
                  "the closer look at the largest stress does not take rigid links and rigid parts")
 
 
