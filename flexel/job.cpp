@@ -83,9 +83,9 @@ void plan_after_files(const JobArguments& arguments, const std::function<void()>
 }
 
 Surface read_parts(const std::vector<std::string>& paths, const ImportOptions& options, Progress& progress) {
-  ImportOptions heard = options;
-  heard.warn = [&](const std::string& line) { progress.warn(line); };
-  Surface surface = import_parts(paths, heard, progress);
+  ImportOptions with_warnings = options;
+  with_warnings.warn = [&](const std::string& line) { progress.warn(line); };
+  Surface surface = import_parts(paths, with_warnings, progress);
   for (const std::string& line : size_warnings(surface)) progress.warn(line);
   for (const std::string& line : refinement_notes(surface)) progress.say(line);
   return surface;

@@ -79,16 +79,16 @@ void add_bodies(py::module_& module) {
                                return std::make_shared<PartObject>(PartObject{object.body.surface});
                              })
       .def("write",
-           [](const BodyObject& object, const std::string& path, bool compress, const py::object& heard) {
-             return run_work(heard, [&] {
+           [](const BodyObject& object, const std::string& path, bool compress, const py::object& listener) {
+             return run_work(listener, [&] {
                if (const std::string line = body_name_warning(path); !line.empty())
                  Progress("flexel").warn(line);
                write_body(object.body, path, {.compress = compress});
              });
            });
-  module.def("read_body", [](const std::string& path, const py::object& heard) {
+  module.def("read_body", [](const std::string& path, const py::object& listener) {
     std::shared_ptr<BodyObject> object;
-    Said said = run_work(heard, [&] { object = body_object(read_body(path)); });
+    Said said = run_work(listener, [&] { object = body_object(read_body(path)); });
     return std::pair(object, std::move(said));
   });
 }

@@ -27,10 +27,10 @@ ImportOptions import_options(const py::dict& options) {
 using PartAndSaid = std::pair<std::shared_ptr<PartObject>, Said>;
 
 PartAndSaid read_part(const std::vector<std::string>& paths, const py::dict& options,
-                      const py::object& heard) {
+                      const py::object& listener) {
   const ImportOptions import = import_options(options);
   auto part = std::make_shared<PartObject>();
-  Said said = run_work(heard, [&] {
+  Said said = run_work(listener, [&] {
     Progress progress("flexel");
     progress.stage("import");
     part->surface = commands::read_parts(paths, import, progress);
@@ -40,13 +40,13 @@ PartAndSaid read_part(const std::vector<std::string>& paths, const py::dict& opt
 
 // `bytes`: a mesh file without a name of its own.
 PartAndSaid part_of_bytes(const py::bytes& bytes, const std::string& name, const py::dict& options,
-                          const py::object& heard) {
+                          const py::object& listener) {
   const ImportOptions import = import_options(options);
   const std::string_view text(bytes);
   const auto* begin = reinterpret_cast<const std::byte*>(text.data());
   const Bytes content(begin, begin + text.size());
   auto part = std::make_shared<PartObject>();
-  Said said = run_work(heard, [&] {
+  Said said = run_work(listener, [&] {
     const MemoryFile file(content);
     Progress progress("flexel");
     try {
@@ -121,8 +121,8 @@ void add_parts(py::module_& module) {
                                return names;
                              })
       .def_property_readonly("unit", [](const PartObject& part) { return default_unit(part.surface); })
-      .def("write", [](const PartObject& part, const std::string& path, const py::object& heard) {
-        return run_work(heard, [&] {
+      .def("write", [](const PartObject& part, const std::string& path, const py::object& listener) {
+        return run_work(listener, [&] {
           const std::vector<Vec3> still(part.surface.vertices.size(), Vec3::Zero());
           write_surface(part.surface, still, surface_format("", path), default_unit(part.surface), path);
         });

@@ -97,7 +97,7 @@ bool on_main_thread() {
   return threading.attr("current_thread")().is(threading.attr("main_thread")());
 }
 
-Listener* heard = nullptr;
+Listener* current = nullptr;
 
 void restore_element_limit(double limit) {
   constexpr double kNone = 1e18;  // and above it; a double of more need not fit
@@ -109,15 +109,15 @@ void restore_element_limit(double limit) {
 class Scope {
  public:
   explicit Scope(Listener& listener)
-      : outer_(heard),
+      : outer_(current),
         outer_error_(std::exchange(callback_error, nullptr)),
         outer_elements_(element_limit()) {
     ++runs;
     restore_element_limit(std::numeric_limits<double>::infinity());  // that of an outer run is its own
-    set_progress_listener(heard = &listener);
+    set_progress_listener(current = &listener);
   }
   ~Scope() {
-    set_progress_listener(heard = outer_);
+    set_progress_listener(current = outer_);
     const bool by_callback = std::exchange(callback_error, outer_error_) != nullptr;
     restore_element_limit(outer_elements_);
     if (--runs == 0) signalled = false;

@@ -74,7 +74,7 @@ int threads_of(const py::dict& given) {
   return threads;
 }
 
-py::tuple voxelize_part(const PartObject& part, const py::dict& given, const py::object& heard) {
+py::tuple voxelize_part(const PartObject& part, const py::dict& given, const py::object& listener) {
   voxelize::VoxelizeOptions options;
   if (!given["size"].is_none()) options.size = taken<double>(given, "size");
   if (!given["count"].is_none()) {
@@ -92,7 +92,7 @@ py::tuple voxelize_part(const PartObject& part, const py::dict& given, const py:
   const int threads = threads_of(given);
   std::shared_ptr<BodyObject> body;
   std::string summary;
-  Said said = run_work(heard, [&] {
+  Said said = run_work(listener, [&] {
     const ThreadLimit limit(threads);
     Progress progress("flexel");
     voxelize::VoxelizeResult result = voxelize::voxelize(part.surface, options, progress);
@@ -150,10 +150,10 @@ simulate::SimulateOptions simulate_options(const py::dict& given) {
 
 py::tuple simulate_body(const BodyObject& body, const std::vector<std::string>& words,
                         const std::string& scene_text, const std::string& scene_name, const py::dict& given,
-                        const py::object& heard) {
+                        const py::object& listener) {
   const simulate::SimulateOptions options = simulate_options(given);
   auto run = std::make_shared<RunObject>();
-  Said said = run_work(heard, [&] {
+  Said said = run_work(listener, [&] {
     Body moved = body.body;
     simulate::erase_stress_columns(moved);
     CommandLine app{"A scene.", "flexel simulate"};
@@ -179,9 +179,9 @@ std::shared_ptr<MappedObject> mapped_object(mapping::MappedPart mapped, const Bo
 
 // As flexel-map; `path`: "" to write nothing; `inputs`: what is not replaced without --force.
 py::tuple map_body(const BodyObject& given, const std::vector<std::string>& words, const std::string& path,
-                   const std::vector<std::string>& inputs, const py::object& heard) {
+                   const std::vector<std::string>& inputs, const py::object& listener) {
   std::shared_ptr<MappedObject> object;
-  Said said = run_work(heard, [&] {
+  Said said = run_work(listener, [&] {
     CommandLine app{"A mapping.", "flexel map"};
     mapping::MapArguments arguments;
     mapping::declare_map_options(app, arguments);
@@ -224,9 +224,9 @@ py::tuple map_body(const BodyObject& given, const std::vector<std::string>& word
 }
 
 py::tuple deform_part(const std::vector<std::string>& words, const std::shared_ptr<PartObject>& part,
-                      const py::object& heard) {
+                      const py::object& listener) {
   auto run = std::make_shared<RunObject>();
-  Said said = run_work(heard, [&] {
+  Said said = run_work(listener, [&] {
     commands::Deformed result =
         commands::deform(words, part ? &part->surface : nullptr, Progress::Mode::automatic);
     run->summary = std::move(result.summary);
@@ -239,9 +239,9 @@ py::tuple deform_part(const std::vector<std::string>& words, const std::shared_p
 }
 
 // A command by its words, the first its name; what it prints goes to its files.
-py::tuple run_command(const std::string& name, std::vector<std::string> words, const py::object& heard) {
+py::tuple run_command(const std::string& name, std::vector<std::string> words, const py::object& listener) {
   int code = 0;
-  Said said = run_work(heard, [&] {
+  Said said = run_work(listener, [&] {
     words.insert(words.begin(), name);
     std::vector<char*> pointers;
     for (std::string& word : words) pointers.push_back(word.data());
@@ -269,10 +269,10 @@ std::vector<Subject> subjects_of(const Subjects& given) {
   return subjects;
 }
 
-py::tuple picture(const Subjects& given, const std::vector<std::string>& words, const py::object& heard) {
+py::tuple picture(const Subjects& given, const std::vector<std::string>& words, const py::object& listener) {
   const auto subjects = subjects_of<picture::PictureSubject>(given);
   Bytes png;
-  Said said = run_work(heard, [&] {
+  Said said = run_work(listener, [&] {
     Progress progress("flexel");
     const picture::PictureResult drawn = commands::draw_subjects(words, subjects, progress);
     for (const std::string& note : drawn.notes) progress.say(note);
@@ -282,10 +282,10 @@ py::tuple picture(const Subjects& given, const std::vector<std::string>& words, 
 }
 
 // The page of flexel view, whole.
-py::tuple page(const Subjects& given, const view::RunWords& words, const py::object& heard) {
+py::tuple page(const Subjects& given, const view::RunWords& words, const py::object& listener) {
   const auto subjects = subjects_of<view::ViewSubject>(given);
   std::string html;
-  Said said = run_work(heard, [&] {
+  Said said = run_work(listener, [&] {
     Progress progress("flexel");
     std::vector<view::ViewFile> files;
     for (const view::ViewSubject& subject : subjects) files.push_back(make_view_file(subject, {}, progress));
@@ -347,11 +347,11 @@ void add_runs(py::module_& module) {
   module.def("run_command", &run_command);
   module.def("check_outputs", &check_paths);
   module.def("picture", &picture);
-  module.def("page",
-             [](const Subjects& subjects, const std::vector<std::string>& warnings,
-                const std::vector<std::string>& lines, const std::string& summary, const py::object& heard) {
-               return page(subjects, {warnings, lines, summary}, heard);
-             });
+  module.def("page", [](const Subjects& subjects, const std::vector<std::string>& warnings,
+                        const std::vector<std::string>& lines, const std::string& summary,
+                        const py::object& listener) {
+    return page(subjects, {warnings, lines, summary}, listener);
+  });
   module.def("materials", &commands::materials_json);
 }
 

@@ -128,14 +128,14 @@ void Progress::update(double share, const std::string& note) {
     if (silent_update != nullptr) silent_update(*this, share, note);
     return;
   }
-  const bool heard = listener != nullptr && mode_ != Mode::quiet;
-  if ((mode_ != Mode::bar && !heard) || stage_.empty()) return;
+  const bool listening = listener != nullptr && mode_ != Mode::quiet;
+  if ((mode_ != Mode::bar && !listening) || stage_.empty()) return;
   const double time = now();
   if (last_drawn_ >= 0 && time - last_drawn_ < kDrawInterval) return;
   last_drawn_ = time;
   const double done = std::isfinite(share) ? std::clamp(share, 0.0, 1.0) : 0.0;
   const std::optional<double> left = seconds_left(time - stage_began_, done);
-  if (heard) return listener->update(stage_, done, note, left);
+  if (listening) return listener->update(stage_, done, note, left);
   const auto filled = static_cast<std::size_t>(std::lround(done * kBarWidth));
   std::string line = fmt::format("{}: {} [{}{}] {:3.0f} %", program_, stage_, std::string(filled, '#'),
                                  std::string(kBarWidth - filled, '.'), std::floor(100 * done));

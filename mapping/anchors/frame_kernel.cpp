@@ -93,7 +93,7 @@ FLEXEL_CLONES Extremes coordinates_in(const RestFrames& rest, const std::uint32_
   for (std::size_t v = 0; v < count; ++v) {
     fetch(vertices + v + kVerticesAhead, sizeof(Vec3));
     const std::uint32_t f = frame[v], next = frame[std::min(v + kFramesAhead, count - 1)];
-    fetch(&rest.to_base[next], sizeof(Carrier));
+    fetch(&rest.to_base[next], sizeof(AffineMap));
     fetch(&rest.base[next], sizeof(Mat3));
     const double *to_base = rest.to_base[f].data(), *point = vertices[v].data();
     const FourDoubles at{point[0], point[1], point[2], 0}, origin = load_as<FourDoubles>(to_base);
@@ -109,11 +109,11 @@ FLEXEL_CLONES Extremes coordinates_in(const RestFrames& rest, const std::uint32_
 }
 
 FLEXEL_CLONES void move_frames(const Frame* frames, std::size_t count, const Mat3* rest_base,
-                               const Vec3* rest, const Vec3* position, bool orthonormal, Carrier* carrier) {
+                               const Vec3* rest, const Vec3* position, bool orthonormal, AffineMap* map) {
   constexpr std::size_t kFramesAhead = 32;
   for (std::size_t begin = 0; begin < count; begin += kLanes) {
     fetch(rest_base + begin + kFramesAhead, kLanes * sizeof(Mat3));
-    fetch(carrier + begin + kFramesAhead, kLanes * sizeof(Carrier));
+    fetch(map + begin + kFramesAhead, kLanes * sizeof(AffineMap));
     Axes axes;
     gather_edges(frames, begin, count, position, axes);
     const auto spanned = spans(axes);
@@ -122,7 +122,7 @@ FLEXEL_CLONES void move_frames(const Frame* frames, std::size_t count, const Mat
       if (frames[f].kind != FrameKind::full) continue;
       const double *now = position[frames[f].elements[0]].data(),
                    *before = rest[frames[f].elements[0]].data();
-      double *translation = carrier[f].data(), *change = translation + 3;
+      double *translation = map[f].data(), *change = translation + 3;
       for (int c = 0; c < 3; ++c) translation[c] = now[c] - before[c];
       for (int axis = 0; axis < 3; ++axis)
         for (int c = 0; c < 3; ++c)
@@ -134,11 +134,11 @@ FLEXEL_CLONES void move_frames(const Frame* frames, std::size_t count, const Mat
 
 // Columns are read four numbers at a time, of which the last belongs to what follows. Four vertices are put
 // together to twelve numbers without gaps.
-FLEXEL_CLONES void carry(const Carrier* carrier, const std::uint32_t* frame, const Vec3* coordinates,
-                         std::size_t count, Vec3* displacement) {
+FLEXEL_CLONES void apply_affine(const AffineMap* map, const std::uint32_t* frame, const Vec3* coordinates,
+                                std::size_t count, Vec3* displacement) {
   constexpr std::size_t kVerticesAhead = 96, kFramesAhead = 16;
   const auto moved = [&](std::size_t v) __attribute__((always_inline)) {
-    const double *by = carrier[frame[v]].data(), *c = coordinates[v].data();
+    const double *by = map[frame[v]].data(), *c = coordinates[v].data();
     return load_as<FourDoubles>(by) +
            ((load_as<FourDoubles>(by + 3) * c[0] + load_as<FourDoubles>(by + 6) * c[1]) +
             load_as<FourDoubles>(by + 9) * c[2]);
@@ -151,7 +151,7 @@ FLEXEL_CLONES void carry(const Carrier* carrier, const std::uint32_t* frame, con
   if (count > 0 && reinterpret_cast<std::uintptr_t>(displacement) % 16 != 0) write_one(v++);
   for (; v + 4 <= count; v += 4) {
     fetch(coordinates + v + kVerticesAhead, 4 * sizeof(Vec3));
-    fetch(&carrier[frame[std::min(v + kFramesAhead, count - 1)]], sizeof(Carrier));
+    fetch(&map[frame[std::min(v + kFramesAhead, count - 1)]], sizeof(AffineMap));
     const FourDoubles a = moved(v), b = moved(v + 1), c = moved(v + 2), d = moved(v + 3);
     double* to = displacement[v].data();
     stream(to, __builtin_shufflevector(a, b, 0, 1, 2, 4));

@@ -7,7 +7,7 @@
 namespace flexel::mapping {
 
 // FrameMotion as apply() needs it: the translation, then the columns of the change.
-using Carrier = Eigen::Matrix<double, 3, 4>;
+using AffineMap = Eigen::Matrix<double, 3, 4>;
 
 // (count) The base that each frame spans in `points`, as rest_base() of mapping/anchors/frame.h builds it; what comes
 // out for kinds other than full means nothing. `orthonormal`: gram_schmidt, else the edges.
@@ -16,7 +16,7 @@ void span_bases(const Frame* frames, std::size_t count, const Vec3* points, bool
 // The frames as binding needs them.
 struct RestFrames {
   std::vector<Mat3> base;           // (frames) at rest
-  std::vector<Carrier> to_base;     // (frames + 1) the origin at rest, then the inverse of the base
+  std::vector<AffineMap> to_base;   // (frames + 1) the origin at rest, then the inverse of the base
   std::vector<std::uint32_t> part;  // (frames)
   std::vector<Mat3> to_spacings;    // (parts) world frame, m -> the lattice's axes, spacings
 };
@@ -39,11 +39,11 @@ Extremes coordinates_in(const RestFrames& rest, const std::uint32_t* frame, cons
 // (count) The motions of frames whose bases at rest span_bases() has built: exactly zero where nothing moved,
 // and without change where the base now spans no volume. Kinds other than full are left as they are.
 void move_frames(const Frame* frames, std::size_t count, const Mat3* rest_base, const Vec3* rest,
-                 const Vec3* position, bool orthonormal, Carrier* carrier);
+                 const Vec3* position, bool orthonormal, AffineMap* map);
 
 // (count) Displacements of vertices with these coordinates in the rest bases of their frames. One more
-// carrier than there are frames must be there to be read.
-void carry(const Carrier* carrier, const std::uint32_t* frame, const Vec3* coordinates, std::size_t count,
-           Vec3* displacement);
+// map than there are frames must be there to be read.
+void apply_affine(const AffineMap* map, const std::uint32_t* frame, const Vec3* coordinates,
+                  std::size_t count, Vec3* displacement);
 
 }  // namespace flexel::mapping

@@ -44,14 +44,14 @@ struct Around {
 
 // An element that only some corners are connected with counts by the weights of those corners.
 void apply_shares(const std::array<double, 8>& share, const std::vector<std::uint8_t>& from,
-                  ElementsInRadius heard) {
+                  ElementsInRadius in_radius) {
   constexpr std::uint8_t kAll = 0xff;
-  for (std::size_t k = 0; k < heard.count; ++k) {
-    const unsigned corners = from[heard.element[k]];
+  for (std::size_t k = 0; k < in_radius.count; ++k) {
+    const unsigned corners = from[in_radius.element[k]];
     if (corners == kAll) continue;
     double sum = 0;
     for (unsigned a = 0; a < 8; ++a) sum += corners >> a & 1 ? share[a] : 0;
-    heard.weight[k] *= static_cast<float>(sum);
+    in_radius.weight[k] *= static_cast<float>(sum);
   }
 }
 
@@ -73,16 +73,17 @@ void weigh_block(const Body& body, const Groups& groups, const Groups::Block& bl
       weights.weight.resize(2 * (used + around.weight.size() + kRoom));
       weights.element.resize(weights.weight.size());
     }
-    ElementsInRadius heard{&weights.element[used], &weights.weight[used], 0};
-    collect_in_radius(around.weight.data(), around.weight.size(), heard);
-    if (group.in_cell) apply_shares(shares(group, point), around.from, heard);
-    if (std::none_of(heard.weight, heard.weight + heard.count, [](float weight) { return weight > 0; }))
-      heard.count = 0;
-    for (; heard.count % kBlendStep != 0; ++heard.count) {
-      heard.element[heard.count] = heard.element[0];
-      heard.weight[heard.count] = 0;
+    ElementsInRadius in_radius{&weights.element[used], &weights.weight[used], 0};
+    collect_in_radius(around.weight.data(), around.weight.size(), in_radius);
+    if (group.in_cell) apply_shares(shares(group, point), around.from, in_radius);
+    if (std::none_of(in_radius.weight, in_radius.weight + in_radius.count,
+                     [](float weight) { return weight > 0; }))
+      in_radius.count = 0;
+    for (; in_radius.count % kBlendStep != 0; ++in_radius.count) {
+      in_radius.element[in_radius.count] = in_radius.element[0];
+      in_radius.weight[in_radius.count] = 0;
     }
-    used += heard.count;
+    used += in_radius.count;
     weights.begin.push_back(static_cast<std::uint32_t>(used));
   }
 }

@@ -36,20 +36,20 @@ FLEXEL_INLINE void write(const FourDoubles& from, double behind, double* to) {
 
 #ifdef FLEXEL_AVX512
 // collect_in_radius(): sixteen at a time are pushed together.
-FLEXEL_AVX512 void collect_by_sixteen(const float* weight, std::size_t count, ElementsInRadius& heard) {
+FLEXEL_AVX512 void collect_by_sixteen(const float* weight, std::size_t count, ElementsInRadius& in_radius) {
   std::size_t used = 0;
   __m512i number = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   for (std::size_t e = 0; e < count; e += 16) {
     const __m512 here = _mm512_loadu_ps(weight + e);
-    const __mmask16 is_heard = _mm512_cmp_ps_mask(here, _mm512_setzero_ps(), _CMP_GT_OQ);
-    _mm512_storeu_ps(heard.weight + used, _mm512_maskz_compress_ps(is_heard, here));
+    const __mmask16 is_in_radius = _mm512_cmp_ps_mask(here, _mm512_setzero_ps(), _CMP_GT_OQ);
+    _mm512_storeu_ps(in_radius.weight + used, _mm512_maskz_compress_ps(is_in_radius, here));
     const __m256i elements =
-        _mm512_maskz_cvtepi32_epi16(0xffff, _mm512_maskz_compress_epi32(is_heard, number));
-    __builtin_memcpy(heard.element + used, &elements, sizeof elements);
-    used += static_cast<std::size_t>(__builtin_popcount(is_heard));
+        _mm512_maskz_cvtepi32_epi16(0xffff, _mm512_maskz_compress_epi32(is_in_radius, number));
+    __builtin_memcpy(in_radius.element + used, &elements, sizeof elements);
+    used += static_cast<std::size_t>(__builtin_popcount(is_in_radius));
     number = _mm512_add_epi32(number, _mm512_set1_epi32(16));
   }
-  heard.count = used;
+  in_radius.count = used;
 }
 #endif
 
@@ -127,18 +127,18 @@ FLEXEL_CLONES void weigh_elements(const float* x, const float* y, const float* z
   }
 }
 
-void collect_in_radius(const float* weight, std::size_t count, ElementsInRadius& heard) {
+void collect_in_radius(const float* weight, std::size_t count, ElementsInRadius& in_radius) {
 #ifdef FLEXEL_AVX512
   static const bool by_sixteen = __builtin_cpu_supports("avx512f");
-  if (by_sixteen) return collect_by_sixteen(weight, count, heard);
+  if (by_sixteen) return collect_by_sixteen(weight, count, in_radius);
 #endif
   std::size_t used = 0;
   for (std::size_t e = 0; e < count; ++e) {  // every one is written; those of weight 0 are overwritten
-    heard.element[used] = static_cast<std::uint16_t>(e);
-    heard.weight[used] = weight[e];
+    in_radius.element[used] = static_cast<std::uint16_t>(e);
+    in_radius.weight[used] = weight[e];
     used += weight[e] > 0;
   }
-  heard.count = used;
+  in_radius.count = used;
 }
 
 FLEXEL_CLONES void fit_gradients(const std::uint32_t* element, const std::uint32_t* frame, std::size_t count,

@@ -49,9 +49,9 @@ struct ElementsInRadius {
   std::size_t count;
 };
 
-// Appends the elements whose weight (count, a multiple of 16) is not 0. `heard` must have space for sixteen
+// Appends the elements whose weight (count, a multiple of 16) is not 0. `in_radius` must have space for sixteen
 // more than it will hold.
-void collect_in_radius(const float* weight, std::size_t count, ElementsInRadius& heard);
+void collect_in_radius(const float* weight, std::size_t count, ElementsInRadius& in_radius);
 
 // The least-squares gradients of `count` elements: element[i]'s from the displacements (x, y, z, 0; m) of
 // what it is connected with. `inverse_moments`, `motion`: (count); see mapping/methods/element_motion.h.

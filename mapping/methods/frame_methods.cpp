@@ -48,21 +48,22 @@ std::shared_ptr<const MethodBinding> load_coordinates(std::span<const std::byte>
 std::vector<Vec3> FrameCoordinates::apply(const Binding& binding, const Body& body,
                                           const std::vector<Vec3>& position) const {
   constexpr std::size_t kFramesAtATime = 1024, kVerticesAtATime = 8192;
-  std::vector<Carrier> carrier;
-  resize_touched(carrier, binding.frames.size() + 1);
+  std::vector<AffineMap> affine;
+  resize_touched(affine, binding.frames.size() + 1);
   parallel_chunks(binding.frames.size(), kFramesAtATime, [&](std::size_t begin, std::size_t end) {
     move_frames(&binding.frames[begin], end - begin, &rest_base[begin], body.rest.data(), position.data(),
-                orthonormal, &carrier[begin]);
+                orthonormal, &affine[begin]);
     for (std::size_t f = begin; f < end; ++f) {
       if (binding.frames[f].kind == FrameKind::full) continue;
       const FrameMotion motion = frame_motion(binding.frames[f], body.rest, position, orthonormal);
-      carrier[f] << motion.translation, motion.change;
+      affine[f] << motion.translation, motion.change;
     }
   });
   std::vector<Vec3> displacement;
   resize_touched(displacement, binding.frame.size());
   parallel_chunks(displacement.size(), kVerticesAtATime, [&](std::size_t begin, std::size_t end) {
-    carry(carrier.data(), &binding.frame[begin], &coordinates[begin], end - begin, &displacement[begin]);
+    apply_affine(affine.data(), &binding.frame[begin], &coordinates[begin], end - begin,
+                 &displacement[begin]);
   });
   return displacement;
 }

@@ -58,12 +58,12 @@ struct Octet {
   }
 
   // Those of `all` within the radius of the points' bounding box.
-  void choose(const std::vector<SmoothNeighbour>& all, std::vector<SmoothNeighbour>& heard) const {
-    heard.clear();
+  void choose(const std::vector<SmoothNeighbour>& all, std::vector<SmoothNeighbour>& chosen) const {
+    chosen.clear();
     for (const SmoothNeighbour& neighbour : all)
       if ((neighbour.at - neighbour.at.cwiseMax(low).cwiseMin(high)).squaredNorm() <
           kSmoothRadius * kSmoothRadius)
-        heard.push_back(neighbour);
+        chosen.push_back(neighbour);
   }
 };
 
@@ -99,7 +99,7 @@ std::vector<Vec3> SmoothBinding::apply(const Binding& binding, const Body& body,
   const std::vector<FrameField> fields = frame_fields(body, binding.frames, position);
   std::vector<Vec3> displacement(groups.vertices.size());
   parallel_chunks(groups.blocks.size(), kBlocksAtATime, [&](std::size_t begin, std::size_t end) {
-    std::vector<SmoothNeighbour> neighbours, heard;
+    std::vector<SmoothNeighbour> neighbours, chosen;
     std::vector<double> weights;
     SmoothFit fit;
     for (std::size_t b = begin; b < end; ++b) {
@@ -112,8 +112,8 @@ std::vector<Vec3> SmoothBinding::apply(const Binding& binding, const Body& body,
       gather(body, groups, group, position, reference, neighbours);
       for (std::uint32_t i = block.begin; i < block.end; i += kSmoothLanes) {
         const Octet octet(body, groups, group, i, block.end);
-        octet.choose(neighbours, heard);
-        fit_quadratics(heard.data(), heard.size(), octet.points, weights, fit);
+        octet.choose(neighbours, chosen);
+        fit_quadratics(chosen.data(), chosen.size(), octet.points, weights, fit);
         for (int l = 0; l < octet.count; ++l) {
           const std::uint32_t v = octet.vertex[l];
           displacement[v] =

@@ -21,7 +21,8 @@ class SpaceMap {
   struct Value {
     Vec3 position = Vec3::Zero();      // phi(x), m
     Mat3 gradient = Mat3::Identity();  // d phi / d x; a determinant of 0 or less: space is folded there
-    bool heard = true;  // false: farther than kBlendRadius from every element, carried by the nearest frame
+    bool in_radius =
+        true;           // false: farther than kBlendRadius from every element, carried by the nearest frame
     double weight = 0;  // of all elements together: falls to 0 where none is near
   };
 

@@ -80,7 +80,7 @@ class WhereCoarse {
     for (std::size_t i = 1; i < 3; ++i)
       if (edge(i) > edge(longest)) longest = i;
     const Vec3 middle = 0.5 * (at.at(longest) + at.at((longest + 1) % 3));
-    return probe.place(middle, triangle.part, triangle.polygon).heard;
+    return probe.place(middle, triangle.part, triangle.polygon).in_radius;
   }
 
   const Body& body_;

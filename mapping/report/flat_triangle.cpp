@@ -53,7 +53,7 @@ MissedPoint FlatTriangles::operator()(const FlatTriangle& triangle) {
   const auto look = [&](double u, double v, const Vec3* from = nullptr, const Vec3* to = nullptr) {
     const Vec3 x = rest[0] + u * (rest[1] - rest[0]) + v * (rest[2] - rest[0]);
     const SpaceMap::Value value = probe_.place(x, triangle.part, triangle.polygon);
-    if (!value.heard || !value.position.allFinite()) return;
+    if (!value.in_radius || !value.position.allFinite()) return;
     found.displacement = std::max(found.displacement, (value.position - x).norm());
     const double distance = from != nullptr ? distance_from_line(value.position, *from, *to)
                                             : std::abs(normal.dot(value.position - moved[0]));

@@ -144,7 +144,7 @@ SpaceField::Probe::Probe(const SpaceField& field) : field_(field), probe_(field.
 SpaceField::Probe::Near SpaceField::Probe::blended(const Vec3& x, std::uint32_t part,
                                                    std::optional<std::size_t> polygon) {
   const SpaceMap::Value value = probe_.place(x, part, polygon);
-  return {value.position - x, value.heard ? value.weight : 0};
+  return {value.position - x, value.in_radius ? value.weight : 0};
 }
 
 SpaceField::Probe::Near SpaceField::Probe::of_cells(const Vec3& x, std::uint32_t part,

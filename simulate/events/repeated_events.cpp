@@ -5,7 +5,7 @@
 
 namespace flexel::simulate {
 
-std::string RepeatedEvents::happen(const Event& event, EventContext& context) {
+std::string RepeatedEvents::apply(const Event& event, EventContext& context) {
   if (event.turns == 1) return event.apply(context);
   Turns& turns = turns_[event.origin];
   ++turns.happened;

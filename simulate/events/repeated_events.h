@@ -11,7 +11,7 @@ class RepeatedEvents {
  public:
   // What the event did, in words. One of several times may find nothing where it looks; it is told once, at its last time: how often
   // it found something, and a warning where it never did. "" before. Throws what the event throws.
-  [[nodiscard]] std::string happen(const Event& event, EventContext& context);
+  [[nodiscard]] std::string apply(const Event& event, EventContext& context);
 
  private:
   struct Turns {

@@ -58,10 +58,10 @@ static void visit(Archive& archive, Checkpoint& c) {
             c.state.kick, c.clock, c.memory.cells.fill, c.memory.cells.plastic, c.memory.cells.springs,
             c.memory.cells.spring_flow, c.memory.connections.flowed, c.memory.connections.strain,
             c.memory.connections.broken, c.memory.reach, c.memory.supports, c.events, c.settled, c.fused,
-            c.memory.effects, c.ledger.accounts, c.ledger.rows, c.ledger.probes, c.ledger.columns,
-            c.ledger.start, c.ledger.changed, c.ledger.worst_residual, c.ledger.unstored,
-            c.ledger.unstored_now, c.ledger.worst_unstored, c.ledger.largest_term, c.next_row, c.next_frame,
-            c.frames.times, c.frames.surface_frame, c.frames.surface_parts);
+            c.memory.effects, c.balance.accounts, c.balance.rows, c.balance.probes, c.balance.columns,
+            c.balance.start, c.balance.changed, c.balance.worst_residual, c.balance.unstored,
+            c.balance.unstored_now, c.balance.worst_unstored, c.balance.largest_term, c.next_row,
+            c.next_frame, c.frames.times, c.frames.surface_frame, c.frames.surface_parts);
 }
 
 void write_checkpoint(const Checkpoint& checkpoint, const Bytes& body, const std::string& path) {

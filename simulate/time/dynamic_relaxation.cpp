@@ -37,7 +37,7 @@ bool settles(const Scene& scene) {
          (contact.on || !contact.planes.empty() || !rigid.parts.empty() || !rigid.manipulators.empty());
 }
 
-Settling::Settling(Scene& scene, const Body& body) {
+DynamicRelaxation::DynamicRelaxation(Scene& scene, const Body& body) {
   const double sound = sound_time(scene, body);
   extent_ = body_extent(body);
   for (const Vec3& at : body.rest) middle_ += at / static_cast<double>(body.element_count());
@@ -60,12 +60,12 @@ Settling::Settling(Scene& scene, const Body& body) {
   summary_.tolerance = scene.run.tolerance_given ? scene.run.tolerance : kSettledTolerance;
 }
 
-void Settling::before(const State& state) {
+void DynamicRelaxation::before(const State& state) {
   velocity_ = state.velocity;
 }
 
-double Settling::after(const State& state, const std::vector<double>& mass,
-                       const std::function<void(SimulateResult&)>& tell) {
+double DynamicRelaxation::after(const State& state, const std::vector<double>& mass,
+                                const std::function<void(SimulateResult&)>& tell) {
   struct Sums {
     double stiffness = 0, mass = 0, kinetic = 0;
     Sums& operator+=(const Sums& other) {
@@ -95,7 +95,7 @@ double Settling::after(const State& state, const std::vector<double>& mass,
 
 // A couple has no force: it counts by its moment over the body's extent. About the body's middle that of a force is less than
 // the force.
-void Settling::look(const State& state, const std::function<void(SimulateResult&)>& tell) {
+void DynamicRelaxation::look(const State& state, const std::function<void(SimulateResult&)>& tell) {
   SimulateResult told;
   tell(told);
   Vec3 middle = middle_;
@@ -112,13 +112,13 @@ void Settling::look(const State& state, const std::function<void(SimulateResult&
   done_ = summary_.residual <= summary_.tolerance && kinetic_ <= summary_.tolerance * largest_;
 }
 
-void Settling::report(SimulateResult& result) const {
+void DynamicRelaxation::report(SimulateResult& result) const {
   result.settled = summary_;
   result.timed.reset();
   sum_up_imbalance(result);
 }
 
-std::string Settling::failure(const Body& body, const State& state) const {
+std::string DynamicRelaxation::failure(const Body& body, const State& state) const {
   return fmt::format(
       "the body does not come to rest: after {} steps the forces left over are {:.2g} of loads and reactions "
       "(tolerance {:.2g}), the kinetic energy {:.3g} J, fastest near {}; look for a part that nothing stops, "

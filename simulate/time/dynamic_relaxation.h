@@ -21,11 +21,11 @@ namespace flexel::simulate {
 // Whether a scene without a time is brought to rest this way.
 [[nodiscard]] bool settles(const Scene& scene);
 
-class Settling {
+class DynamicRelaxation {
  public:
   // Gives `scene`, which it must outlive, the courses of a run that settles. Throws InputError: what it does
   // not take.
-  Settling(Scene& scene, const Body& body);
+  DynamicRelaxation(Scene& scene, const Body& body);
 
   // Before a step: the velocities that it begins with.
   void before(const State& state);

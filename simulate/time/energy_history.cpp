@@ -41,14 +41,14 @@ Account::Kind kind_of(EnergyAccount account) {
 
 }  // namespace
 
-std::size_t Ledger::account(const std::string& name, Account::Kind kind) {
+std::size_t EnergyBalance::account(const std::string& name, Account::Kind kind) {
   for (std::size_t a = 0; a < accounts.size(); ++a)
     if (accounts[a].name == name) return a;
   accounts.push_back({name, kind, 0});
   return accounts.size() - 1;
 }
 
-std::string Ledger::csv() const {
+std::string EnergyBalance::csv() const {
   std::string text = "time [s],kinetic [J],elastic [J],potential [J],work [J],dissipated [J],residual [J]";
   for (const Account& account : accounts) append_text(text, ",{} {} [J]", account.name, called(account.kind));
   for (const char* name : {"momentum", "angular momentum"})
@@ -77,7 +77,7 @@ std::string Ledger::csv() const {
   return text;
 }
 
-std::vector<std::pair<std::string, double>> Ledger::sums() const {
+std::vector<std::pair<std::string, double>> EnergyBalance::sums() const {
   const Energies& last = rows.back().energies;
   return {{"kinetic", last.kinetic},
           {"elastic", last.elastic},
@@ -91,7 +91,7 @@ std::vector<std::pair<std::string, double>> Ledger::sums() const {
 
 EnergyHistory::EnergyHistory(const Problem& problem, const std::vector<ActiveEffect>& effects,
                              const std::vector<ProbePoints>& probes, const std::vector<double>& mass,
-                             const PaperModel* paper, const KernelEffects& plan, Ledger ledger)
+                             const PaperModel* paper, const KernelEffects& plan, EnergyBalance balance)
     : problem_(problem),
       effects_(effects),
       probes_(probes),
@@ -100,7 +100,7 @@ EnergyHistory::EnergyHistory(const Problem& problem, const std::vector<ActiveEff
       cells_(problem, no_stencil_),
       forces_(effects.size()),
       remembers_(plan.remembers()),
-      ledger_(std::move(ledger)) {
+      balance_(std::move(balance)) {
   own_.assign(effects.size(), 0);
   stored_.assign(effects.size(), 0);
   for (const Part& part : problem.body.parts)
@@ -113,25 +113,25 @@ EnergyHistory::EnergyHistory(const Problem& problem, const std::vector<ActiveEff
     const EnergyAccount account = effects[p]->account();
     if (account == EnergyAccount::none || account == EnergyAccount::potential) continue;
     forces_[p].assign(problem.body.element_count(), Vec3::Zero());
-    own_[p] = ledger_.account(effects[p].name, kind_of(account));
+    own_[p] = balance_.account(effects[p].name, kind_of(account));
   }
-  supports_ = ledger_.account("supports", Account::Kind::work);
-  damping_ = ledger_.account("damping", Account::Kind::dissipation);
-  if (!plan.plasticity.empty()) plasticity_ = ledger_.account("plasticity", Account::Kind::dissipation);
-  if (!plan.fracture.empty()) fracture_ = ledger_.account("fracture", Account::Kind::dissipation);
-  ledger_.probes.clear();
-  for (const ProbePoints& probe : probes) ledger_.probes.push_back(probe.name);
-  ledger_.columns.clear();
+  supports_ = balance_.account("supports", Account::Kind::work);
+  damping_ = balance_.account("damping", Account::Kind::dissipation);
+  if (!plan.plasticity.empty()) plasticity_ = balance_.account("plasticity", Account::Kind::dissipation);
+  if (!plan.fracture.empty()) fracture_ = balance_.account("fracture", Account::Kind::dissipation);
+  balance_.probes.clear();
+  for (const ProbePoints& probe : probes) balance_.probes.push_back(probe.name);
+  balance_.columns.clear();
   for (const ActiveEffect& effect : effects)
-    for (std::string& column : effect->history_columns()) ledger_.columns.push_back(std::move(column));
+    for (std::string& column : effect->history_columns()) balance_.columns.push_back(std::move(column));
 }
 
 void EnergyHistory::before(const State& state, bool sample, double folding) {
   for (std::size_t p = 0; p < effects_.size(); ++p)
     for (const EnergyTransfer& each : effects_[p]->take_transfers(state)) {
       if (each.energy == 0) continue;
-      ledger_.accounts[own_[p]].energy -= each.energy;
-      ledger_.accounts[ledger_.account(each.from, kind_of(each.kind))].energy += each.energy;
+      balance_.accounts[own_[p]].energy -= each.energy;
+      balance_.accounts[balance_.account(each.from, kind_of(each.kind))].energy += each.energy;
     }
   velocity_ = state.velocity;
   sample_ = sample;
@@ -160,11 +160,11 @@ void EnergyHistory::after(const State& state, const StepOutcome& outcome, const 
   const auto add_powers = [&](const std::vector<Vec3>& velocity, double time, bool behind) {
     for (const ActiveEffect& effect : effects_)
       for (const EffectPower& each : effect->powers(behind))
-        ledger_.accounts[ledger_.account(each.account, kind_of(each.kind))].energy += time * each.power;
+        balance_.accounts[balance_.account(each.account, kind_of(each.kind))].energy += time * each.power;
     const auto enter = [&](std::size_t account, const std::vector<Vec3>& forces) {
-      ledger_.accounts[account].energy += time * parallel_sum<double>(forces.size(), [&](std::size_t e) {
-                                            return forces[e].dot(velocity[e]);
-                                          });
+      balance_.accounts[account].energy += time * parallel_sum<double>(forces.size(), [&](std::size_t e) {
+                                             return forces[e].dot(velocity[e]);
+                                           });
     };
     for (std::size_t p = 0; p < effects_.size(); ++p)
       if (!forces_[p].empty()) enter(own_[p], forces_[p]);
@@ -173,14 +173,14 @@ void EnergyHistory::after(const State& state, const StepOutcome& outcome, const 
     enter(damping_, connection_damping_);
   };
   // before an event the half step to it was entered
-  if (!ledger_.changed) add_powers(velocity_, 0.5 * previous_step, false);
-  const std::vector<Account> kept = closing_ ? ledger_.accounts : std::vector<Account>();
-  if (plasticity_) ledger_.accounts[*plasticity_].energy -= outcome.plastic_work;
-  if (fracture_) ledger_.accounts[*fracture_].energy -= outcome.released;
+  if (!balance_.changed) add_powers(velocity_, 0.5 * previous_step, false);
+  const std::vector<Account> kept = closing_ ? balance_.accounts : std::vector<Account>();
+  if (plasticity_) balance_.accounts[*plasticity_].energy -= outcome.plastic_work;
+  if (fracture_) balance_.accounts[*fracture_].energy -= outcome.released;
   if (outcome.elastic) elastic_ += *outcome.elastic;
   if (sample_) add_row(state, supports, half_kick);
   if (closing_)
-    ledger_.accounts = kept;
+    balance_.accounts = kept;
   else
     add_powers(state.velocity, 0.5 * step, true);
 }
@@ -194,26 +194,26 @@ void EnergyHistory::add_row_of(const State& state, const std::vector<Vec3>& supp
 void EnergyHistory::enter(const std::vector<Vec3>& moved, const std::vector<Vec3>& damping,
                           const std::vector<Vec3>& supports, double numerical) {
   const auto add = [&](std::size_t account, const std::vector<Vec3>& forces) {
-    ledger_.accounts[account].energy +=
+    balance_.accounts[account].energy +=
         parallel_sum<double>(forces.size(), [&](std::size_t e) { return forces[e].dot(moved[e]); });
   };
   for (std::size_t p = 0; p < effects_.size(); ++p)
     if (!forces_[p].empty()) add(own_[p], forces_[p]);
   add(supports_, supports);
   add(damping_, damping);
-  ledger_.accounts[ledger_.account("numerical", Account::Kind::dissipation)].energy -= numerical;
+  balance_.accounts[balance_.account("numerical", Account::Kind::dissipation)].energy -= numerical;
 }
 
 // What an event changed of what is stored, it gave or took: the sum of what stores lack stays what it was.
 void EnergyHistory::book_stored_by_event() {
-  double lacking = ledger_.unstored_now - ledger_.unstored;
+  double lacking = balance_.unstored_now - balance_.unstored;
   std::optional<std::size_t> store;
   for (std::size_t p = 0; p < effects_.size(); ++p) {
     if (effects_[p]->account() != EnergyAccount::stored || forces_[p].empty()) continue;
     store = own_[p];
-    lacking += ledger_.accounts[own_[p]].energy + stored_[p];
+    lacking += balance_.accounts[own_[p]].energy + stored_[p];
   }
-  if (store) ledger_.accounts[*store].energy -= lacking;
+  if (store) balance_.accounts[*store].energy -= lacking;
 }
 
 // Of the elements, but of free rigid parts as a whole.
@@ -243,27 +243,27 @@ void EnergyHistory::add_row(const State& state, const std::vector<Vec3>& support
   row.angular = sum.angular;
   Energies& now = row.energies;
   now = {sum.kinetic, elastic_, potential_, 0, 0, 0};
-  if (ledger_.changed && !ledger_.rows.empty()) book_stored_by_event();
+  if (balance_.changed && !balance_.rows.empty()) book_stored_by_event();
   double unstored = 0;
   for (std::size_t p = 0; p < effects_.size(); ++p) {
     if (effects_[p]->account() != EnergyAccount::stored || forces_[p].empty()) continue;
-    if (!ledger_.start) ledger_.accounts[own_[p]].energy -= stored_[p];  // that it begins with
-    if (stored_[p] == 0 && ledger_.accounts[own_[p]].energy != 0) {
-      const double left = std::exchange(ledger_.accounts[own_[p]].energy, 0);
-      ledger_.accounts[ledger_.account("numerical", Account::Kind::dissipation)].energy += left;
-      ledger_.unstored -= left;
+    if (!balance_.start) balance_.accounts[own_[p]].energy -= stored_[p];  // that it begins with
+    if (stored_[p] == 0 && balance_.accounts[own_[p]].energy != 0) {
+      const double left = std::exchange(balance_.accounts[own_[p]].energy, 0);
+      balance_.accounts[balance_.account("numerical", Account::Kind::dissipation)].energy += left;
+      balance_.unstored -= left;
     }
-    unstored -= ledger_.accounts[own_[p]].energy + stored_[p];
+    unstored -= balance_.accounts[own_[p]].energy + stored_[p];
   }
-  ledger_.unstored_now = ledger_.unstored + unstored;
-  ledger_.worst_unstored = std::max(ledger_.worst_unstored, std::abs(ledger_.unstored_now));
+  balance_.unstored_now = balance_.unstored + unstored;
+  balance_.worst_unstored = std::max(balance_.worst_unstored, std::abs(balance_.unstored_now));
   double book = now.kinetic + now.elastic + now.potential;
-  for (const Account& account : ledger_.accounts) book -= account.energy;
-  if (ledger_.changed && !ledger_.rows.empty())
-    ledger_.accounts[ledger_.account("events", Account::Kind::work)].energy +=
-        book - *ledger_.start - ledger_.rows.back().energies.residual;
-  ledger_.changed = false;
-  for (const Account& account : ledger_.accounts) {
+  for (const Account& account : balance_.accounts) book -= account.energy;
+  if (balance_.changed && !balance_.rows.empty())
+    balance_.accounts[balance_.account("events", Account::Kind::work)].energy +=
+        book - *balance_.start - balance_.rows.back().energies.residual;
+  balance_.changed = false;
+  for (const Account& account : balance_.accounts) {
     const bool gives = account.kind == Account::Kind::work;
     double& term = gives                                        ? now.work
                    : account.kind == Account::Kind::dissipation ? now.dissipated
@@ -272,36 +272,37 @@ void EnergyHistory::add_row(const State& state, const std::vector<Vec3>& support
     row.accounts.push_back(gives ? account.energy : 0.0 - account.energy);
   }
   book = now.kinetic + now.elastic + now.potential + now.dissipated - now.work;
-  if (!ledger_.start) ledger_.start = book;
-  now.residual = book - *ledger_.start;
-  ledger_.worst_residual = std::max(ledger_.worst_residual, std::abs(now.residual));
+  if (!balance_.start) balance_.start = book;
+  now.residual = book - *balance_.start;
+  balance_.worst_residual = std::max(balance_.worst_residual, std::abs(now.residual));
   for (const double term : {now.kinetic, now.elastic, now.potential, now.work, now.dissipated})
-    ledger_.largest_term = std::max(ledger_.largest_term, std::abs(term));
+    balance_.largest_term = std::max(balance_.largest_term, std::abs(term));
   for (const ProbePoints& probe : probes_)
     for (const double value : measure(probe, sampled_).displacement) row.probes.push_back(value);
   std::vector<Vec3> unbalanced(problem_.body.element_count(), Vec3::Zero());
   for (std::size_t e = 0; e < supports.size(); ++e) unbalanced[e] = -supports[e];
   for (const ActiveEffect& effect : effects_)
     for (const double value : effect->history_values(sampled_, unbalanced)) row.values.push_back(value);
-  ledger_.rows.push_back(std::move(row));
+  balance_.rows.push_back(std::move(row));
 }
 
 void EnergyHistory::refuse_broken_books(const State& state) const {
-  if (!ledger_.rows.empty() && !std::isfinite(ledger_.rows.back().energies.residual + ledger_.unstored_now))
+  if (!balance_.rows.empty() &&
+      !std::isfinite(balance_.rows.back().energies.residual + balance_.unstored_now))
     throw DivergedError(
         fmt::format("an energy is no number any more, the fastest element rests near {}: give a shorter "
                     "[run] step or load "
                     "it more slowly",
                     fastest_near(problem_.body, state)));
-  if (ledger_.rows.size() < kFirstJudged || !(ledger_.largest_term > least_)) return;
+  if (balance_.rows.size() < kFirstJudged || !(balance_.largest_term > least_)) return;
   const double lost =
-      std::max(std::abs(ledger_.rows.back().energies.residual), std::abs(ledger_.unstored_now));
-  if (lost < kMostLost * ledger_.largest_term) return;
+      std::max(std::abs(balance_.rows.back().energies.residual), std::abs(balance_.unstored_now));
+  if (lost < kMostLost * balance_.largest_term) return;
   throw DivergedError(fmt::format(
       "{:.3g} J of at most {:.3g} J in the books of energy have come from nowhere or gone there, the "
       "fastest element rests near {}: give a shorter [run] step, load it more slowly or damp it "
       "([damping])",
-      lost, ledger_.largest_term, fastest_near(problem_.body, state)));
+      lost, balance_.largest_term, fastest_near(problem_.body, state)));
 }
 
 }  // namespace flexel::simulate

@@ -45,7 +45,7 @@ struct BookRow {
 };
 
 // What the books have summed up: all that goes on when the run does.
-struct Ledger {
+struct EnergyBalance {
   std::vector<Account> accounts;
   std::vector<BookRow> rows;
   std::vector<std::string> probes;   // names
@@ -67,11 +67,11 @@ struct Ledger {
 
 class EnergyHistory {
  public:
-  // Refers to all but the ledger, which it goes on with, while it lives. `paper`: of the centre-placed parts;
+  // Refers to all but the balance, which it goes on with, while it lives. `paper`: of the centre-placed parts;
   // null: there are none.
   EnergyHistory(const Problem& problem, const std::vector<ActiveEffect>& effects,
                 const std::vector<ProbePoints>& probes, const std::vector<double>& mass,
-                const PaperModel* paper, const KernelEffects& plan, Ledger ledger = {});
+                const PaperModel* paper, const KernelEffects& plan, EnergyBalance balance = {});
 
   // Before a step: keeps the velocities and, where `sample`, the energies of the state. `folding`: of the
   // barriers of cells [J], which those that the step itself tells the energy of do not know.
@@ -99,8 +99,8 @@ class EnergyHistory {
   // Throws DivergedError where more than half of the largest energy has come from nowhere or gone there.
   void refuse_broken_books(const State& state) const;
 
-  [[nodiscard]] const Ledger& ledger() const { return ledger_; }
-  [[nodiscard]] Ledger take_ledger() { return std::move(ledger_); }
+  [[nodiscard]] const EnergyBalance& balance() const { return balance_; }
+  [[nodiscard]] EnergyBalance take_balance() { return std::move(balance_); }
 
  private:
   struct Momenta {
@@ -128,8 +128,8 @@ class EnergyHistory {
   bool remembers_;
   std::vector<Vec3> connection_damping_;  // (elements) or empty
   std::vector<Vec3> velocity_;            // before the step
-  Ledger ledger_;
-  std::vector<std::size_t> own_;  // (effects) places in the ledger
+  EnergyBalance balance_;
+  std::vector<std::size_t> own_;  // (effects) places in the balance
   std::vector<double> stored_;    // (effects) J, in those that store, at the sample
   double least_ = 0;              // J, less is not judged
   std::size_t supports_ = 0, damping_ = 0;

@@ -178,9 +178,9 @@ void TimeSegment::make_forces() {
   }
 }
 
-std::unique_ptr<EnergyHistory> TimeSegment::make_history(Ledger ledger) const {
+std::unique_ptr<EnergyHistory> TimeSegment::make_history(EnergyBalance balance) const {
   auto history = std::make_unique<EnergyHistory>(problem_, effects_, probes_, stepper_->mass(),
-                                                 paper_ ? &*paper_ : nullptr, plan_, std::move(ledger));
+                                                 paper_ ? &*paper_ : nullptr, plan_, std::move(balance));
   for (std::size_t p = 0; p < effects_.size(); ++p)
     if (effects_[p]->constant() && !history->forces_of(p).empty())
       effects_[p]->add_forces(state_, history->forces_of(p));

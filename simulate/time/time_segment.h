@@ -120,7 +120,7 @@ class TimeSegment {
   [[nodiscard]] bool is_implicit() const { return euler_.has_value(); }
   // What was fused before it and has not broken.
   [[nodiscard]] std::vector<FusedPoint> fused() const { return joined_ ? joined_->left() : fused_; }
-  [[nodiscard]] std::unique_ptr<EnergyHistory> make_history(Ledger ledger) const;
+  [[nodiscard]] std::unique_ptr<EnergyHistory> make_history(EnergyBalance balance) const;
 
  private:
   class ModelTimer;

@@ -45,7 +45,7 @@ constexpr double kSameTime = 1e-12;  // share of a time
 class TimedRun {
  public:
   TimedRun(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress,
-           std::optional<Settling> settling = {});
+           std::optional<DynamicRelaxation> relaxation = {});
   SimulateResult operator()();
 
  private:
@@ -55,7 +55,9 @@ class TimedRun {
   void keep();
   [[nodiscard]] bool save_checkpoint();
   bool attempt(const std::string& what, const std::function<void()>& write);
-  [[nodiscard]] bool over() const { return (live_ && live_->ended()) || (settling_ && settling_->done()); }
+  [[nodiscard]] bool over() const {
+    return (live_ && live_->ended()) || (relaxation_ && relaxation_->done());
+  }
   void play();
   void play_until(double end, bool resumed);
   void enter_half_step();
@@ -81,9 +83,9 @@ class TimedRun {
   Clock clock_;
   SegmentStart start_;  // of the act
   std::optional<TimeSegment> segment_;
-  std::unique_ptr<EnergyHistory> history_;  // of the act; null: none asked for
-  std::optional<Settling> settling_;        // nothing: a run in time
-  std::unique_ptr<LiveLink> live_;          // null: neither poses nor frames
+  std::unique_ptr<EnergyHistory> history_;       // of the act; null: none asked for
+  std::optional<DynamicRelaxation> relaxation_;  // nothing: a run in time
+  std::unique_ptr<LiveLink> live_;               // null: neither poses nor frames
   std::optional<Series> series_;
   LastSound sound_;
   SimulateResult result_;           // what acts that are over added to it
@@ -99,13 +101,13 @@ class TimedRun {
 };
 
 TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress,
-                   std::optional<Settling> settling)
+                   std::optional<DynamicRelaxation> relaxation)
     : body_(body),
       scene_(scene),
       options_(options),
       progress_(progress),
       duration_(*scene.run.time),
-      settling_(std::move(settling)) {
+      relaxation_(std::move(relaxation)) {
   for (const Event& event : scene_.events)
     if (event.prepare)
       for (std::string& name : event.prepare()) scene_.coming_parts.push_back(std::move(name));
@@ -131,9 +133,9 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
   else
     begin();
   if (!options.history.empty())
-    history_ = segment_->make_history(options.resume ? options.resume->ledger : Ledger{});
+    history_ = segment_->make_history(options.resume ? options.resume->balance : EnergyBalance{});
   segment_->set_hear([this](const std::string& note) { listen(note); });
-  if (settling_) refuse_timed(segment_->effects(), ActsIn::relaxation_and_time, scene_.name);
+  if (relaxation_) refuse_timed(segment_->effects(), ActsIn::relaxation_and_time, scene_.name);
 }
 
 // With what stuck at the end of an earlier run.
@@ -189,7 +191,7 @@ void TimedRun::keep() {
   kept_->events = events_;
   kept_->settled = start_.settled;
   kept_->fused = start_.fused;
-  if (history_) kept_->ledger = history_->ledger();
+  if (history_) kept_->balance = history_->balance();
   if (series_) kept_->frames = series_->place();
   kept_->next_row = next_row_;
   kept_->next_frame = next_frame_;
@@ -226,9 +228,9 @@ void TimedRun::check() {
   sound_.keep(segment_->state());
   segment_->adapt_step(clock_);
   const double time = *segment_->state().time;
-  if (settling_)
+  if (relaxation_)
     progress_.update(time / duration_,
-                     fmt::format("step {}, residual {:.2g}", clock_.steps, settling_->summary().residual));
+                     fmt::format("step {}, residual {:.2g}", clock_.steps, relaxation_->summary().residual));
   else
     progress_.update(time / duration_, fmt::format("{:.4g} s, step {}", time, clock_.steps));
 }
@@ -242,15 +244,15 @@ void TimedRun::advance(bool row) {
 
 void TimedRun::step() {
   const bool due = history_ && *segment_->state().time >= next_row_;
-  const bool row = due || (history_ && history_->ledger().changed);
+  const bool row = due || (history_ && history_->balance().changed);
   if (due) next_row_ += scene_.run.history_every.value_or(duration_ / kRows);
   if (live_) live_->await(clock_.epoch + static_cast<double>(clock_.in_epoch + 1) * clock_.step);
-  if (settling_) settling_->before(segment_->state());
+  if (relaxation_) relaxation_->before(segment_->state());
   advance(row);
   if (row) history_->refuse_broken_books(segment_->state());
-  if (settling_)
-    segment_->slow(settling_->after(segment_->state(), segment_->stepper().mass(),
-                                    [&](SimulateResult& told) { segment_->tell_forces(told); }));
+  if (relaxation_)
+    segment_->slow(relaxation_->after(segment_->state(), segment_->stepper().mass(),
+                                      [&](SimulateResult& told) { segment_->tell_forces(told); }));
   if (live_) live_->keep_pace(segment_->state());
 }
 
@@ -275,7 +277,7 @@ double TimedRun::now() const {
 // Leaves the body at `state` (nothing: none was sound), and in the file for runs that end early; says where
 // that is.
 std::string TimedRun::save(const std::optional<State>& state) {
-  if (history_) attempt("history", [&] { write_text(history_->ledger().csv(), options_.history, true); });
+  if (history_) attempt("history", [&] { write_text(history_->balance().csv(), options_.history, true); });
   if (!state) return "";
   if (segment_)
     segment_->store(*state);
@@ -292,8 +294,8 @@ SimulateResult TimedRun::report() {
   segment_->report(clock_, options_.stress, result);
   result.timed->live = live_summary_;
   segment_->add_effort(result, options_.explain);
-  if (history_) result.timed->books = history_->ledger().sums();
-  if (settling_) settling_->report(result);
+  if (history_) result.timed->books = history_->balance().sums();
+  if (relaxation_) relaxation_->report(result);
   refuse_not_finite(result, scene_.name);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
   if (options_.explain) explain_times(result.shares, result.seconds, progress_);
@@ -320,7 +322,7 @@ void TimedRun::play_until(double end, bool resumed) {
   if (live_ && (first || resumed)) live_->start(segment_->state());
   if (kept_) keep();
   sound_.keep(segment_->state());
-  if (!history_ && !settling_) segment_->spare_mass();
+  if (!history_ && !relaxation_) segment_->spare_mass();
   segment_->unload();
   const std::uint64_t between = segment_->is_implicit() ? 1 : kCheck;
   while (goes_on()) {
@@ -356,11 +358,11 @@ void TimedRun::bond_joined(std::size_t first, const State& state) {
 // Events up to `end` happen now, and another act begins.
 void TimedRun::apply(std::size_t end) {
   const StopWaits whole;  // between two acts there is no state to save
-  Ledger ledger;
+  EnergyBalance balance;
   if (history_) {
     if (clock_.steps > 0) segment_->close_books(clock_, *history_);
-    ledger = history_->take_ledger();
-    ledger.changed = !ledger.rows.empty();
+    balance = history_->take_balance();
+    balance.changed = !balance.rows.empty();
     history_.reset();
   }
   const bool was_whole = std::exchange(at_whole_step_, clock_.steps > 0 && segment_->kicks());
@@ -381,7 +383,7 @@ void TimedRun::apply(std::size_t end) {
     const Problem problem = timed_problem(body_, scene_, start_);
     EventContext context{body_,   state,     start_.fused, start_.settled,
                          problem, progress_, event.turn,   event.turns};
-    const std::string what = repeated_.happen(event, context);
+    const std::string what = repeated_.apply(event, context);
     if (!what.empty()) progress_.say(fmt::format("at {:.4g} s {}: {}", event.at, event.name, what));
   }
   bond_joined(parts, state);
@@ -398,7 +400,7 @@ void TimedRun::apply(std::size_t end) {
   if (!was_edited && edits_damping(body_) && !segment_->damps())
     progress_.warn("edit: the scene has no [damping] that \"damping\" could change");
   segment_->set_hear([this](const std::string& note) { listen(note); });
-  if (!options_.history.empty()) history_ = segment_->make_history(std::move(ledger));
+  if (!options_.history.empty()) history_ = segment_->make_history(std::move(balance));
 }
 
 void TimedRun::play() {
@@ -413,7 +415,8 @@ void TimedRun::play() {
     apply(end);
   }
   play_until(duration_, resumed);
-  if (settling_ && !settling_->done()) throw DivergedError(settling_->failure(body_, segment_->state()));
+  if (relaxation_ && !relaxation_->done())
+    throw DivergedError(relaxation_->failure(body_, segment_->state()));
   if (live_) live_summary_ = live_->finish(segment_->state());
   if (history_) segment_->close_books(clock_, *history_);
 }
@@ -422,7 +425,7 @@ void TimedRun::play() {
 SimulateResult TimedRun::ended() {
   segment_->store(segment_->state());
   forget_edits(body_);
-  if (history_) write_text(history_->ledger().csv(), options_.history);
+  if (history_) write_text(history_->balance().csv(), options_.history);
   SimulateResult result = report();
   if (scene_.run.renormalise)
     renormalise_all(body_, timed_problem(body_, scene_, start_), segment_->state().displacement);
@@ -457,8 +460,8 @@ SimulateResult run_in_time(Body& body, const Scene& scene, const SimulateOptions
 
 SimulateResult settle(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress) {
   Scene made = scene;
-  Settling settling(made, body);
-  SimulateResult result = TimedRun(body, made, options, progress, std::move(settling))();
+  DynamicRelaxation relaxation(made, body);
+  SimulateResult result = TimedRun(body, made, options, progress, std::move(relaxation))();
   body.element_columns.erase("velocity");
   return result;
 }

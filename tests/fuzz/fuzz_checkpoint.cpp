@@ -45,9 +45,9 @@ Bytes checkpoint_of(const Body& body) {
   c.memory.cells.fill.resize(2);
   c.memory.cells.plastic.resize(2);
   c.fused = {{{1, 2, 3}, {0.5, 0.5, -1}, 6}};
-  c.ledger.accounts = {{"loads", simulate::Account::Kind::work, 1.5}};
-  c.ledger.rows = {simulate::BookRow{}};
-  c.ledger.probes = {"tip"};
+  c.balance.accounts = {{"loads", simulate::Account::Kind::work, 1.5}};
+  c.balance.rows = {simulate::BookRow{}};
+  c.balance.probes = {"tip"};
   c.frames = {{0, 0.5}, 1, 2};
   const std::string path =
       std::filesystem::temp_directory_path() / ("fuzz-checkpoint-" + std::to_string(getpid()));

@@ -124,7 +124,7 @@ TEST(SpaceMap, FollowsAffineMotionsFarOutToo) {
     const SpaceMap::Value value = probe.at(x, 0);
     EXPECT_LT((value.position - affine(x)).norm(), 1e-11);
     EXPECT_LT((value.gradient - shear).norm(), 1e-10);
-    EXPECT_EQ(value.heard, out < 5);
+    EXPECT_EQ(value.in_radius, out < 5);
   }
 }
 
@@ -139,7 +139,7 @@ TEST(SpaceMap, ThePlaceIsThatWithTheGradient) {
         body.parts[0].lattice.to_world(Vec3(12 * share(random), 8 * share(random), 6 * share(random)));
     const SpaceMap::Value a = probe.at(x, 0), b = other.place(x, 0);
     EXPECT_EQ(a.position, b.position);
-    EXPECT_EQ(a.heard, b.heard);
+    EXPECT_EQ(a.in_radius, b.in_radius);
     EXPECT_EQ(a.weight, b.weight);
   }
 }

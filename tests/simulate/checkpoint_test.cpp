@@ -41,7 +41,7 @@ Checkpoint some_checkpoint(const Body& body) {
   c.events = 2;
   c.settled = c.state.velocity;
   c.fused = {{{1, 2, 3}, {0.5, 0.5, -1}, 6}, {{}, {}, 7}};
-  c.ledger.accounts = {{"loads", Account::Kind::work, 1.5}, {"damping", Account::Kind::dissipation, -2}};
+  c.balance.accounts = {{"loads", Account::Kind::work, 1.5}, {"damping", Account::Kind::dissipation, -2}};
   BookRow row;
   row.time = 9;
   row.energies.residual = 1e-17;
@@ -49,10 +49,10 @@ Checkpoint some_checkpoint(const Body& body) {
   row.momentum = Vec3(1, 2, 3);
   row.angular = Vec3(4, 5, 6);
   row.probes = {12};
-  c.ledger.rows = {BookRow{}, row};
-  c.ledger.probes = {"tip"};
-  c.ledger.start = -1;
-  c.ledger.changed = true;
+  c.balance.rows = {BookRow{}, row};
+  c.balance.probes = {"tip"};
+  c.balance.start = -1;
+  c.balance.changed = true;
   c.next_row = 13;
   c.next_frame = 14;
   c.frames = {{0, 0.5}, 1, 2};
@@ -87,10 +87,10 @@ TEST_F(CheckpointFile, ComesBackToTheBit) {
   EXPECT_EQ(found.clock.steps, 6);
   EXPECT_EQ(found.memory.cells.plastic[2].hourglass[3][2][1], 7);
   EXPECT_EQ(found.memory.cells.springs[3].broken[7], 8);
-  EXPECT_EQ(found.ledger.rows[1].angular, Vec3(4, 5, 6));
-  EXPECT_EQ(found.ledger.accounts[1].name, "damping");
+  EXPECT_EQ(found.balance.rows[1].angular, Vec3(4, 5, 6));
+  EXPECT_EQ(found.balance.accounts[1].name, "damping");
   EXPECT_EQ(found.fused[0].weights, wanted.fused[0].weights);
-  EXPECT_TRUE(found.ledger.changed);
+  EXPECT_TRUE(found.balance.changed);
   EXPECT_EQ(found.frames.times, wanted.frames.times);
   EXPECT_EQ(found.frames.surface_frame, wanted.frames.surface_frame);
   EXPECT_EQ(found.frames.surface_parts, wanted.frames.surface_parts);

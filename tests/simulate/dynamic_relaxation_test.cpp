@@ -44,7 +44,7 @@ Manipulator hold(const std::string& part, const Vec3& displacement = Vec3::Zero(
 // Two columns of two materials, one on the other, under a load: springs in series. Without Poisson's ratio
 // each is E A / L; the contact yields by p h / (3 E) / stiffness, with E of both in series, and half a
 // hundredth of a cell.
-TEST(Settling, TwoStackedBlocksAreSpringsInSeries) {
+TEST(DynamicRelaxation, TwoStackedBlocksAreSpringsInSeries) {
   Body body = block("lower", {4, 4, 4}, Vec3::Zero());
   append(body, block("upper", {4, 4, 4}, Vec3(0, 0, 4 * kSide)));
   Scene scene = still(0);
@@ -75,7 +75,7 @@ TEST(Settling, TwoStackedBlocksAreSpringsInSeries) {
 }
 
 // Of a couple no force is left to measure what is left over by.
-TEST(Settling, ABarComesToRestUnderACouple) {
+TEST(DynamicRelaxation, ABarComesToRestUnderACouple) {
   for (const bool follower : {false, true}) {
     const auto turned = [&](bool contact) {
       Body body = block("bar", {6, 2, 2});
@@ -102,7 +102,7 @@ TEST(Settling, ABarComesToRestUnderACouple) {
 }
 
 // On a table that is held, so that what it carries is told, and tilted against both lattices.
-TEST(Settling, ABlockAtRestWeighsOnWhatCarriesIt) {
+TEST(DynamicRelaxation, ABlockAtRestWeighsOnWhatCarriesIt) {
   const Mat3 axes = testing::turn(0.4, Vec3(0, 0, 1));
   Body body = block("block", {3, 3, 3}, Vec3(0, 0, 0.0004), axes);
   append(body, block("table", {6, 6, 1}, Vec3(-0.025, -0.015, -kSide)));
@@ -116,7 +116,7 @@ TEST(Settling, ABlockAtRestWeighsOnWhatCarriesIt) {
   EXPECT_LT(std::abs(result.reactions[0].force.x()), 1e-3 * weight);
 }
 
-TEST(Settling, ABlockComesToRestOnAPlane) {
+TEST(DynamicRelaxation, ABlockComesToRestOnAPlane) {
   Body body = block("block", {2, 2, 4}, Vec3(0, 0, 0.0002));
   Scene scene = still(0);
   scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
@@ -139,7 +139,7 @@ TEST(Settling, ABlockComesToRestOnAPlane) {
 }
 
 // A rigid plate, led as far as its path goes, presses as it does in a slow run in time.
-TEST(Settling, ToolsTakeTheirPaths) {
+TEST(DynamicRelaxation, ToolsTakeTheirPaths) {
   Body body = block("block", {3, 3, 4}, Vec3::Zero());
   append(body, block("plate", {5, 5, 1}, Vec3(-0.01, -0.01, 0.04)));
   Scene scene = still(0);
@@ -153,7 +153,7 @@ TEST(Settling, ToolsTakeTheirPaths) {
 
 // Parts that begin inside each other are out before rest is looked for, however long that was to take in
 // time, and lie as they would had they begun side by side.
-TEST(Settling, WhatBeginsInsideSomethingElseIsLetOutFirst) {
+TEST(DynamicRelaxation, WhatBeginsInsideSomethingElseIsLetOutFirst) {
   const auto sunk = [](double inside, double parting, double tolerance) {
     Body body = block("lower", {2, 2, 2}, Vec3::Zero());
     append(body, block("upper", {2, 2, 2}, Vec3(0, 0, (2 - inside) * kSide)));
@@ -177,7 +177,7 @@ TEST(Settling, WhatBeginsInsideSomethingElseIsLetOutFirst) {
           << parting << " " << tolerance;
 }
 
-TEST(Settling, WhatNothingStopsIsToldOf) {
+TEST(DynamicRelaxation, WhatNothingStopsIsToldOf) {
   Body body = block("block", {1, 1, 1}, Vec3::Zero());
   Scene scene = still(0.3);
   scene.get<Gravity>().acceleration = Vec3(0, 0, -9.81);
@@ -190,7 +190,7 @@ TEST(Settling, WhatNothingStopsIsToldOf) {
   }
 }
 
-TEST(Settling, WhatActsInTimeIsRefused) {
+TEST(DynamicRelaxation, WhatActsInTimeIsRefused) {
   Body body = block("block", {2, 2, 2}, Vec3::Zero());
   Scene scene = still(0.3);
   testing::throw_part(scene, "block", Vec3(1, 0, 0));
