@@ -72,7 +72,9 @@ Bytes answer_in(Bytes output, const TellShare& hear) {
   const std::size_t shares = read_shares(output, share);
   if (shares == 0) return output;
   if (hear) hear(share);
-  return Bytes(output.begin() + static_cast<std::ptrdiff_t>(shares), output.end());
+  // in place: an answer may be large
+  output.erase(output.begin(), output.begin() + static_cast<std::ptrdiff_t>(shares));
+  return output;
 }
 
 Bytes run_job(const ForeignProgram& program, const Bytes& job, const ChildLimits& limits,
