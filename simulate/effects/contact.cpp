@@ -236,9 +236,10 @@ std::string Contact::unsure_fits() const {
   const std::string others =
       fits.size() > 1 ? fmt::format(", and {} other pair(s) of parts", human_count(fits.size() - 1)) : "";
   return fmt::format(
-      "[contact] curved surfaces of parts \"{}\" and \"{}\"{} fit each other to {} ({:.2g} cells), which is "
-      "not told from their facets: what of it is an interference or an offset may press with half of its "
-      "force, with twice that or not at all; smaller cells and finer facets tell",
+      "[contact] curved surfaces of parts \"{}\" and \"{}\"{} fit each other to {} ({:.2g} cells), too "
+      "little to "
+      "be told from their facets: an interference or an offset so small may press with half of its force, "
+      "with twice that or not at all; smaller cells and finer facets tell",
       names_[worst.parts[0]], names_[worst.parts[1]], others, human_length(worst.misfit),
       worst.misfit / worst.width);
 }
