@@ -104,10 +104,9 @@ WholeOverlap least_squares_overlap(const OverlapMoments& sums) {
 // hundredth of a spacing): it may press with a third of its force, with 1.7 times that or not at all. Surfaces that fit so
 // well that nothing can press are sure, and so is a clearance wider than the facets.
 bool is_unsure(const WholeOverlap& whole, double width) {
-  constexpr double kTrusted =
-      0.02;                      // spacings, of an overlap that presses within a quarter beside fine facets
-  constexpr double kBeyond = 2;  // standard deviations of coarse ones, likewise
-  constexpr double kNegligible = 0.005;  // spacings, that an overlap and half of the scatter make
+  // spacings: an overlap that presses within a quarter beside fine facets; that and half of the scatter, which are nothing
+  constexpr double kTrusted = 0.02, kNegligible = 0.005;
+  constexpr double kBeyond = 2;  // standard deviations of coarse facets, likewise
   const double most = whole.fit.depth + whole.fit.offset.norm();
   return std::abs(most) < std::max(kTrusted * width, kBeyond * whole.scatter) &&
          whole.size + 0.5 * whole.scatter > kNegligible * width;
