@@ -320,6 +320,8 @@ FileFacts facts_of(const MeshReadJob& job, const Warn& warn) {
             fmt::format("holds {}>, which assimp does not read right: export it anew with triangles "
                         "and matrices, or as STL",
                         element));
+  } else if (job.format == "ms3d") {
+    facts.left_out.emplace_back("names of groups");  // assimp makes one node of all, without a name
   } else if (job.format == "blend") {
     warn("Blender's modifiers are read in part only: apply them before saving, or export STL");
   }

@@ -72,6 +72,7 @@ Bytes answer_in(Bytes output, const TellShare& hear) {
   const std::size_t shares = read_shares(output, share);
   if (shares == 0) return output;
   if (hear) hear(share);
+  // in place: an answer may be large
   output.erase(output.begin(), output.begin() + static_cast<std::ptrdiff_t>(shares));
   return output;
 }

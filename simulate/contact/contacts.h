@@ -24,6 +24,7 @@ class Contacts {
   // Whether there may be friction, damping or adhesion.
   [[nodiscard]] bool dissipate() const { return list_.materials().dissipate(); }
   [[nodiscard]] const std::vector<ContactPoint>& points() const { return surface_.points(); }
+  [[nodiscard]] const std::vector<UnsureFit>& unsure_fits() const { return list_.unsure_fits(); }
 
   [[nodiscard]] double energy(const State& state);  // J, of the forces along the normals
   [[nodiscard]] bool act(const State& state);       // whether any pair is near

@@ -63,6 +63,7 @@ class TimedRun {
   void enter_half_step();
   void apply(std::size_t end);
   void bond_joined(std::size_t first, const State& state);
+  void warn_of_unsure_fits();
   void check();
   void step();
   void advance(bool row);
@@ -144,6 +145,7 @@ void TimedRun::begin() {
   if (!stuck.empty()) start_.transferred_states = {{Contact::name, transfer_of(stuck)}};
   segment_.emplace(body_, scene_, options_, progress_, start_, state_of(body_));
   start_.transferred_states.clear();
+  warn_of_unsure_fits();
   const bool sticks = scene_.get<Contact>().sticks() || body_.element_columns.contains("stick_change");
   if (!stuck.empty() && !sticks) {
     progress_.warn(
@@ -161,6 +163,12 @@ void TimedRun::begin() {
         fmt::format("{} of the {} places that stuck at the end of an earlier run are not there in "
                     "this scene's contact, and stick no more",
                     stuck.size() - found, stuck.size()));
+}
+
+void TimedRun::warn_of_unsure_fits() {
+  for (const ActiveEffect& effect : segment_->effects())
+    if (const auto* contact = dynamic_cast<const Contact*>(&effect.untimed()))
+      if (const std::string told = contact->unsure_fits(); !told.empty()) progress_.warn(told);
 }
 
 void TimedRun::resume(const Checkpoint& from) {
@@ -397,6 +405,7 @@ void TimedRun::apply(std::size_t end) {
   }
   segment_.emplace(body_, scene_, options_, progress_, start_, std::move(state));
   sound_.keep(segment_->state());  // of the elements that there are now
+  if (body_.parts.size() > parts) warn_of_unsure_fits();
   if (!was_edited && edits_damping(body_) && !segment_->damps())
     progress_.warn("edit: the scene has no [damping] that \"damping\" could change");
   segment_->set_hear([this](const std::string& note) { listen(note); });

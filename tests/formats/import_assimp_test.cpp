@@ -151,6 +151,91 @@ std::string mesh_3ds(const std::string& name, bool turned) {
                                              chunk(0x4120, count(8) + bytes_of(faces))));
 }
 
+// A number with its most significant byte first.
+template <class Number>
+std::string big(Number number) {
+  const std::string bytes = bytes_of(std::vector{number});
+  return {bytes.rbegin(), bytes.rend()};
+}
+
+std::string lwo_chunk(const std::string& tag, const std::string& content) {
+  std::string text = tag;
+  text += big(static_cast<std::uint32_t>(content.size()));
+  text += content;
+  text.append(content.size() % 2, '\0');
+  return text;
+}
+
+// A layer "wedge" in metres; its axes are left-handed, and polygons clockwise.
+std::string lwo() {
+  const auto text_of = [](std::string name) { return name.append(name.size() % 2 == 0 ? 2 : 1, '\0'); };
+  std::string points, polygons = "FACE", surfaces = "SURF", layer(16, '\0');
+  for (const Vec3& at : kWedge)
+    for (const double number : {at.x(), at.y(), -at.z()}) points += big(static_cast<float>(1e-3 * number));
+  for (std::uint16_t n = 0; n < kTriangles.size(); ++n) {
+    polygons += big(std::uint16_t{3});
+    for (const int corner : {0, 2, 1})
+      polygons += big(static_cast<std::uint16_t>(kTriangles[n][static_cast<std::size_t>(corner)]));
+    surfaces += big(n);
+    surfaces += big(std::uint16_t{0});
+  }
+  layer += text_of("wedge");
+  std::string surface = text_of("grey");
+  surface += text_of("");
+  std::string text = "LWO2";
+  text += lwo_chunk("TAGS", text_of("grey"));
+  text += lwo_chunk("LAYR", layer);
+  text += lwo_chunk("PNTS", points);
+  text += lwo_chunk("POLS", polygons);
+  text += lwo_chunk("PTAG", surfaces);
+  text += lwo_chunk("SURF", surface);
+  return lwo_chunk("FORM", text);
+}
+
+// Two groups of MilkShape, "first" and "second".
+std::string ms3d() {
+  const auto number = [](std::size_t value) {
+    return bytes_of(std::vector{static_cast<std::uint16_t>(value)});
+  };
+  std::string points, faces, groups;
+  for (std::size_t w = 0; w < 2; ++w) {
+    for (const Vec3& each : kWedge) {
+      const Vec3 at = w == 0 ? each : second(each);
+      points += '\0';
+      points += bytes_of(
+          std::vector{static_cast<float>(at.x()), static_cast<float>(at.y()), static_cast<float>(at.z())});
+      points.append("\xff\0", 2);  // no bone
+    }
+    for (const auto& t : kTriangles) {
+      faces += number(0);
+      for (const int corner : t) faces += number(static_cast<std::size_t>(corner) + 6 * w);
+      faces.append(15 * sizeof(float), '\0');  // normals, texture coordinates
+      faces += '\1';
+      faces += static_cast<char>(w);
+    }
+    std::string name = w == 0 ? "first" : "second";
+    name.resize(32, '\0');
+    groups += '\0';
+    groups += name;
+    groups += number(kTriangles.size());
+    for (std::size_t n = 0; n < kTriangles.size(); ++n) groups += number(n + kTriangles.size() * w);
+    groups += '\xff';  // no material
+  }
+  std::string text = "MS3D000000";
+  text += bytes_of(std::vector{std::int32_t{4}});
+  text += number(12);
+  text += points;
+  text += number(16);
+  text += faces;
+  text += number(2);
+  text += groups;
+  text += number(0);  // materials
+  text += bytes_of(std::vector{24.0F, 0.0F});
+  text += bytes_of(std::vector{std::int32_t{1}});
+  text += number(0);  // joints
+  return text;
+}
+
 std::string three_ds() {
   return chunk(0x4d4d, chunk(0x3d3d, mesh_3ds("first", false) + mesh_3ds("second", true)));
 }
@@ -440,11 +525,39 @@ TEST(ImportAssimp, WhatIsLeftOutIsTold) {
   EXPECT_THAT(lines[0], HasSubstr("IndexedLineSet"));
 }
 
+TEST(ImportAssimp, LightWaveHasMetresALayersNameAndTheOtherHand) {
+  const Scratch scratch;
+  const Surface surface = import_surface(scratch.write("a.lwo", lwo()));
+  ASSERT_EQ(surface.parts.size(), 1u);
+  EXPECT_EQ(surface.parts[0].name, "wedge");
+  EXPECT_EQ(surface.sources[0].format, "lwo");
+  EXPECT_DOUBLE_EQ(surface.sources[0].unit, 1);
+  EXPECT_EQ(triangles_of(surface, 0), triangles_of(wedge_surface(false), 0));
+}
+
+TEST(ImportAssimp, MilkShapeIsOnePartWithoutTheNamesOfItsGroups) {
+  const Scratch scratch;
+  std::vector<std::string> lines;
+  ImportOptions options;
+  options.warn = [&](const std::string& line) { lines.push_back(line); };
+  options.unit = 1e-3;
+  const Surface surface = import_surface(scratch.write("a.ms3d", ms3d()), options);
+  ASSERT_EQ(surface.parts.size(), 1u);
+  EXPECT_EQ(surface.sources[0].format, "ms3d");
+  std::vector<std::array<double, 9>> both = triangles_of(wedge_surface(false), 0);
+  for (const std::array<double, 9>& triangle : triangles_of(wedge_surface(true), 0)) both.push_back(triangle);
+  std::sort(both.begin(), both.end());
+  EXPECT_EQ(triangles_of(surface, 0), both);
+  ASSERT_EQ(lines.size(), 1u);
+  EXPECT_THAT(lines[0], HasSubstr("names of groups"));
+}
+
 TEST(ImportAssimp, DamageIsOneLine) {
   const Scratch scratch;
-  const std::string whole[] = {collada("", kColladaUse), x3d("", 1, ""), amf(), dxf(4), fbx(1), three_ds()};
-  const char* extensions[] = {"dae", "x3d", "amf", "dxf", "fbx", "3ds"};
-  for (std::size_t f = 0; f < 6; ++f)
+  const std::string whole[] = {
+      collada("", kColladaUse), x3d("", 1, ""), amf(), dxf(4), fbx(1), three_ds(), lwo(), ms3d()};
+  const char* extensions[] = {"dae", "x3d", "amf", "dxf", "fbx", "3ds", "lwo", "ms3d"};
+  for (std::size_t f = 0; f < 8; ++f)
     for (const std::size_t share : {3, 7}) {
       const std::string path = scratch.write(fmt::format("cut{}.{}", share, extensions[f]),
                                              whole[f].substr(0, whole[f].size() * share / 10));

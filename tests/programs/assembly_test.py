@@ -139,6 +139,25 @@ def test_a_press_fit_presses_as_a_pin_that_swells():
         expect(abs(pushes(3, text)) < .01 * swollen, f"a pin that just fits presses nothing: {text}")
 
 
+def test_a_fit_that_facets_hide_is_told():
+    need_step()
+    need("gmsh")
+
+    def told(offset, radius):
+        """Lines about a pin so far off the middle of a hole of 3 mm, mm."""
+        write("fitted.geo", BOLTED.split("Cylinder(4)")[0].replace("0, 0, 7, 4", "0, 0, 7, 3") + f'Cylinder(4) = {{{offset}, 0, -6, 0, 0, 15, {radius}}};\nSave "fitted.step";\n')
+        run("gmsh", "fitted.geo", "-0", "-v", "1")
+        expect_ok(run("flexel-voxelize", "fitted.step", "--size", "2 mm", "-o", "body.vtu", "--quiet", "--force"))
+        scene("fit.toml", 'material = "PLA"\n[contact]\noverlap = "part"\noverlap_time = "1 ms"\n[run]\ntime = "1 us"\n' + HELD)
+        said = expect_ok(run("flexel-simulate", "fit.toml", "body.vtu", "-o", "pressed.vtu", "--quiet", "--force")).err
+        return [line for line in said.splitlines() if "fit each other" in line]
+
+    lines = told(.02, 3)
+    expect(len(lines) == 1 and '"fitted" and "fitted-2"' in lines[0] and "not at all" in lines[0], lines)
+    for offset, radius in (.1, 3), (0, 3.05), (0, 2.7):
+        expect(told(offset, radius) == [], f"{offset} {radius}")
+
+
 def test_names_of_assemblies_stand_for_their_parts():
     need_step()
     part = PARTS / "as1-oc-214.stp"

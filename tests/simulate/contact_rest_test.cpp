@@ -249,46 +249,99 @@ TEST(Contact, APressFitPressesByItsInterference) {
     }
 }
 
+// A pin of `sides[1]` sides in the hole of a plate of `sides[0]`.
+struct PinInHole {
+  double radius, offset, interference;  // spacings
+  std::array<std::uint32_t, 2> sides;
+
+  static inline const Vec3 kWay = Vec3(std::cos(0.3), std::sin(0.3), 0);
+
+  // With the offset and the interference, or in the middle and of the hole's size.
+  [[nodiscard]] Body body(bool begins) const {
+    const Mat3 aslant = turn(0.07, Vec3::UnitZ());  // facets of both do not lie on each other
+    Body made = prism(block("plate", {12, 12, 4}, Vec3(-6 * kSide, -6 * kSide, -0.5 * kSide)), sides[0],
+                      5 * kSide, radius * kSide, 0, 3 * kSide);
+    const Vec3 to = begins ? Vec3(offset * kSide * kWay) : Vec3(Vec3::Zero());
+    Body pin = prism(block("pin", {8, 8, 8}, to + Vec3(-4 * kSide, -4 * kSide, -2.5 * kSide)), sides[1],
+                     (begins ? radius + interference : radius) * kSide, 0, -1.2 * kSide, 4.1 * kSide);
+    for (Vec3& vertex : pin.surface.vertices) vertex = aslant * vertex + to;
+    append(made, pin);
+    return made;
+  }
+
+  // N, against the offset, let out in `release` [s]; `begins`: as body(), or moved and swollen there.
+  [[nodiscard]] double pressed(bool begins, double release) const {
+    const Body made = body(begins);
+    const std::vector<Vec3> forces = forces_let_out(made, release, 1, [&](std::uint32_t e) -> Vec3 {
+      if (begins) return Vec3::Zero();
+      return kSide * offset * kWay + interference / radius * Vec3(made.rest[e].x(), made.rest[e].y(), 0);
+    });
+    double sum = 0;
+    for (std::uint32_t e = made.parts[1].element_begin; e < made.parts[1].element_end; ++e)
+      sum -= forces[e].dot(kWay);
+    return sum;
+  }
+
+  [[nodiscard]] std::vector<UnsureFit> unsure() const {
+    const Body made = body(true);
+    const Problem problem = problem_of(made);
+    ContactSettings settings = all_parts(made);
+    settings.release_time = 0.01;
+    return Contacts(std::move(settings), problem).unsure_fits();
+  }
+};
+
 // A pin that is not in the middle of its hole presses as one that is pushed there, however few cells its radius has: the
 // facets do not hide the offset, with an interference or without.
 TEST(Contact, APinOffTheMiddleOfItsHolePressesAsOneThatIsPushedThere) {
-  struct Begins {
-    double radius, offset, interference;  // spacings
-  };
-  const Vec3 way(std::cos(0.3), std::sin(0.3), 0);
-  const auto pressed = [&](const Begins& at, const std::array<std::uint32_t, 2>& sides, bool begins,
-                           double release) {
-    const double wider = at.interference * kSide, off = at.offset * kSide, radius = at.radius * kSide;
-    const Mat3 aslant = turn(0.07, Vec3::UnitZ());  // facets of both do not lie on each other
-    Body body = prism(block("plate", {12, 12, 4}, Vec3(-6 * kSide, -6 * kSide, -0.5 * kSide)), sides[0],
-                      5 * kSide, radius, 0, 3 * kSide);
-    const Vec3 to = begins ? Vec3(off * way) : Vec3(Vec3::Zero());
-    Body pin = prism(block("pin", {8, 8, 8}, to + Vec3(-4 * kSide, -4 * kSide, -2.5 * kSide)), sides[1],
-                     begins ? radius + wider : radius, 0, -1.2 * kSide, 4.1 * kSide);
-    for (Vec3& vertex : pin.surface.vertices) vertex = aslant * vertex + to;
-    append(body, pin);
-    const std::vector<Vec3> forces = forces_let_out(body, release, 1, [&](std::uint32_t e) -> Vec3 {
-      if (begins) return Vec3::Zero();
-      return off * way + wider / radius * Vec3(body.rest[e].x(), body.rest[e].y(), 0);
-    });
-    double sum = 0;
-    for (std::uint32_t e = body.parts[1].element_begin; e < body.parts[1].element_end; ++e)
-      sum -= forces[e].dot(way);
-    return sum;
-  };
-  for (const Begins& at : {Begins{1.3, 0.05, 0},
-                           {1.6, 0.02, 0},
-                           {1.6, 0.05, 0},
-                           {1.6, 0.2, 0},
-                           {1.6, 0.03, 0.03},
-                           {2.7, 0.03, 0},
-                           {2.7, 0.2, 0}})
+  for (const std::array<double, 3>& at : {std::array{1.3, 0.05, 0.0},
+                                          {1.6, 0.02, 0.0},
+                                          {1.6, 0.05, 0.0},
+                                          {1.6, 0.2, 0.0},
+                                          {1.6, 0.03, 0.03},
+                                          {2.7, 0.03, 0.0},
+                                          {2.7, 0.2, 0.0}})
     for (const std::array<std::uint32_t, 2>& sides : {std::array{40u, 40u}, {18u, 16u}}) {
-      const double pushed = pressed(at, sides, false, 0);
+      const PinInHole pin{at[0], at[1], at[2], sides};
+      const double pushed = pin.pressed(false, 0);
       EXPECT_GT(pushed, 0);
-      EXPECT_NEAR(pressed(at, sides, true, 0.01) / pushed, 1, at.offset < 0.03 ? 0.2 : 0.1)
-          << at.radius << " " << at.offset << " " << at.interference << " " << sides[0];
+      EXPECT_NEAR(pin.pressed(true, 0.01) / pushed, 1, pin.offset < 0.03 ? 0.2 : 0.1)
+          << pin.radius << " " << pin.offset << " " << pin.interference << " " << sides[0];
     }
+}
+
+// A wrong force is told, whatever makes it: a small offset, coarse facets.
+TEST(Contact, AFitIsToldWhereFacetsHideIt) {
+  std::size_t wrong = 0;
+  for (const double radius : less_if_sanitized<std::vector<double>>({1.3, 2.7}, {1.3}, "one of two radii"))
+    for (const std::array<std::uint32_t, 2>& sides :
+         {std::array{40u, 40u}, {18u, 16u}, {10u, 8u}, {12u, 10u}})
+      for (const double offset : {0.005, 0.02, 0.05}) {
+        const PinInHole pin{radius, offset, 0, sides};
+        const double share = pin.pressed(true, 0.01) / pin.pressed(false, 0);
+        if (std::abs(share - 1) < 0.3) continue;
+        ++wrong;
+        EXPECT_EQ(pin.unsure().size(), 1) << radius << " " << offset << " " << sides[0] << ": " << share;
+      }
+  EXPECT_GT(wrong, 3);
+}
+
+TEST(Contact, AFitIsNotToldWhereItIsSure) {
+  for (const PinInHole& pin : {PinInHole{1.6, 0, 0, {40, 40}},  // in the middle, and just fits
+                               {1.6, 0.03, 0, {40, 40}},
+                               {2.7, 0.05, 0, {40, 40}},
+                               {1.6, 0, 0.03, {40, 40}},
+                               {2.7, 0.2, 0, {18, 16}},
+                               {2.7, 0, -0.06, {18, 16}}})  // a clearance
+    EXPECT_TRUE(pin.unsure().empty()) << pin.radius << " " << pin.offset << " " << pin.interference;
+}
+
+TEST(Contact, AFitIsToldWithItsSize) {
+  const std::vector<UnsureFit> told = PinInHole{1.6, 0.012, 0, {40, 40}}.unsure();
+  ASSERT_EQ(told.size(), 1);
+  EXPECT_EQ(told[0].parts, (std::array{0u, 1u}));
+  EXPECT_NEAR(told[0].misfit / (std::sqrt(0.5) * 0.012 * kSide), 1, 0.2);  // the mean square of a cosine
+  EXPECT_NEAR(told[0].width, kSide, 1e-12);
 }
 
 // The tip of a screw presses a pin as one that comes from apart, beside a plate whose hole the pin fills: that fit is not its.

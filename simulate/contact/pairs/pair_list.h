@@ -48,6 +48,7 @@ class PairList {
   }
   [[nodiscard]] std::uint64_t builds() const { return builds_; }  // lists made so far
   [[nodiscard]] const ContactMaterials& materials() const { return materials_; }
+  [[nodiscard]] const std::vector<UnsureFit>& unsure_fits() const { return rest_overlaps_.unsure(); }
 
   // For checkpoints: (ContactSurface::elements() x 3) m, displacements for which the list was made.
   [[nodiscard]] bool built() const { return built_; }

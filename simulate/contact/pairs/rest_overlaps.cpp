@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "base/math/dense.h"
 
@@ -99,6 +100,44 @@ WholeOverlap least_squares_overlap(const OverlapMoments& sums) {
   whole.size = std::sqrt(depth * depth + std::max(explained, 0.0));
   whole.scatter = std::sqrt(std::max(left, 0.0));
   return whole;
+}
+
+// Whether facets hide what the surfaces around a point overlap by at most, or contact is too soft for that (its first
+// hundredth of a spacing): it may press with a third of its force, with 1.7 times that or not at all. Surfaces that fit so
+// well that nothing can press are sure, and so is a clearance wider than the facets.
+bool is_unsure(const WholeOverlap& whole, double width) {
+  // spacings: an overlap that presses within a quarter beside fine facets; that and half of the scatter, which are nothing
+  constexpr double kTrusted = 0.02, kNegligible = 0.005;
+  constexpr double kBeyond = 2;  // standard deviations of coarse facets, likewise
+  const double most = whole.fit.depth + whole.fit.offset.norm();
+  return std::abs(most) < std::max(kTrusted * width, kBeyond * whole.scatter) &&
+         whole.size + 0.5 * whole.scatter > kNegligible * width;
+}
+
+// Parts of which a quarter of what fits or more is unsure.
+std::vector<UnsureFit> unsure_fits(const std::vector<FacingPair>& pairs, const std::vector<RestFit>& fits,
+                                   const std::vector<WholeOverlap>& wholes,
+                                   const std::vector<ContactPoint>& points) {
+  constexpr double kShare = 0.25;
+  struct Weights {
+    double all = 0, unsure = 0, squares = 0, width = 0;  // N/m; N/m; N m; m
+  };
+  std::map<std::array<std::uint32_t, 2>, Weights> of_parts;
+  for (const FacingPair& pair : pairs) {
+    const ContactPoint &a = points[pair.i], &b = points[pair.j];
+    if (!fits[pair.i].is_one) continue;
+    Weights& sum = of_parts[{std::min(a.part, b.part), std::max(a.part, b.part)}];
+    sum.all += pair.weight;
+    sum.width = a.width;
+    if (!is_unsure(wholes[pair.i], a.width)) continue;
+    sum.unsure += pair.weight;
+    sum.squares += pair.weight * wholes[pair.i].size * wholes[pair.i].size;
+  }
+  std::vector<UnsureFit> unsure;
+  for (const auto& [parts, sum] : of_parts)
+    if (sum.unsure > kShare * sum.all)
+      unsure.push_back({parts, std::sqrt(sum.squares / sum.unsure), sum.width});
+  return unsure;
 }
 
 // Marks the points around which pairs are with several parts: how one of these fits says nothing of the others, but their own
@@ -197,6 +236,7 @@ void RestOverlaps::find_fits(const ContactMaterials& materials, const ExcludedPa
     if (whole.size > kScatter * whole.scatter) fits_[i] = whole.fit;
     fits_[i].is_one = true;
   }
+  unsure_ = unsure_fits(pairs, fits_, wholes, points);
   spread_to_rims(at, is_paired);
 }
 

@@ -6,6 +6,9 @@
 // the middle of its hole. Where that exceeds what the pairs scatter by, it presses in full; only what a pair overlaps by
 // beyond it is the facets'.
 #pragma once
+#include <array>
+#include <vector>
+
 #include "simulate/contact/pairs/contact_materials.h"
 #include "simulate/contact/pairs/excluded_pairs.h"
 
@@ -20,6 +23,12 @@ struct RestFit {
   [[nodiscard]] double along(const Vec3& normal) const { return depth + offset.dot(normal); }
 };
 
+// Two parts whose surfaces fit each other nearly: what they overlap by is too little to be told from their facets.
+struct UnsureFit {
+  std::array<std::uint32_t, 2> parts{};  // ascending
+  double misfit = 0, width = 0;          // m: root mean square of c + a . n where that is so; spacing
+};
+
 class RestOverlaps {
  public:
   // `surface` outlives this.
@@ -29,6 +38,8 @@ class RestOverlaps {
   // m, penetration at rest that presses nothing, of points of two parts. Beyond `hard` such a pair exerts no force
   // (PairPhase::penetrated).
   [[nodiscard]] double of(std::uint32_t i, std::uint32_t j, const PairConstants& constants) const;
+  // By parts: such a fit may press with half of its force, with twice that or not at all.
+  [[nodiscard]] const std::vector<UnsureFit>& unsure() const { return unsure_; }
 
  private:
   [[nodiscard]] ContactSide at_rest(std::uint32_t point) const;
@@ -41,6 +52,7 @@ class RestOverlaps {
   bool released_ = false;             // what overlaps is let out: only surfaces that fit keep an overlap
   std::vector<std::uint8_t> curved_;  // (surface points) 1: a face of a curved surface; empty: none is asked
   std::vector<RestFit> fits_;         // (surface points)
+  std::vector<UnsureFit> unsure_;
 };
 
 }  // namespace flexel::simulate
