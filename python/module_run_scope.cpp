@@ -32,9 +32,13 @@ static_assert(std::atomic<bool>::is_always_lock_free);
 thread_local bool tells_progress = false;  // Python's function of progress has the thread
 bool forked_within_run = false;
 
-// Of a fork's child: no thread of it will ever give back what a run holds.
+// Of a fork's child: no thread of it will ever give back what a run holds. A run that begins or ends has the lock, but is not
+// counted, while it waits for the GIL; its own lock a fork's child does not have either.
 void look_at_fork() {
-  forked_within_run = forked_within_run || runs > 0;
+  if (one_run.try_lock())
+    one_run.unlock();
+  else
+    forked_within_run = true;
 }
 
 void on_interrupt(int signal) {

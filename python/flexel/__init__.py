@@ -177,11 +177,12 @@ def study(part: Paths, *, output: Union[str, os.PathLike], progress: Progress = 
     """What accuracy costs in time, as `flexel study`: writes study.html, study.csv and study.json to the folder `output`, and
     returns what study.json holds. options: scene, fix, push, material, budget="2 min", reference, against.
     """
-    code, _ = heard(_flexel.run_command, "study", words(options) + ["--output=" + path_text(output), "--"] + paths(part),
+    folder = path_text(output)
+    code, _ = heard(_flexel.run_command, "study", words(options) + ["--output=" + folder, "--"] + paths(part),
                     progress=progress)
     if code:
         raise KeyboardInterrupt
-    with open(os.path.join(output, "study.json"), encoding="utf-8") as file:
+    with open(os.path.join(folder, "study.json"), encoding="utf-8") as file:
         return json.load(file)
 
 

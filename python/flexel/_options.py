@@ -108,10 +108,14 @@ def is_scene_text(scene) -> bool:
 
 
 def path(value) -> str:
-    """A path as a text. Raises ValueError where what opens it would read a part of it only."""
+    """A path as a text. Raises ValueError where what opens it would read a part of it only, or cannot read it."""
     text = os.fsdecode(value)
     if "\0" in text:
         raise ValueError(f"{text!r} is no path: it holds a null character")
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        raise ValueError(f"{text!r} is not UTF-8: rename the file, or run the command") from None
     return text
 
 

@@ -8,6 +8,8 @@ import time
 import warnings as python_warnings
 from typing import Callable, Optional, Union
 
+import numpy as np
+
 from .errors import FlexelWarning
 
 ProgressFunction = Callable[[str, float, str, Optional[float]], None]
@@ -53,6 +55,8 @@ def listener(progress: Progress):
     """What the module is given for `progress`: None, or a function."""
     if callable(progress):
         return progress
+    if isinstance(progress, np.bool_):
+        progress = bool(progress)
     if progress is False:
         return None
     if progress is not True and progress is not None:

@@ -227,6 +227,7 @@ void refuse_outputs(const Scene& scene, const SimulateOptions& options) {
   if (!options.history.empty()) refuse("--history");
   if (!options.live.empty()) refuse("--live");
   if (!options.checkpoint.empty()) refuse("--checkpoint");
+  if (!options.isa.empty()) refuse("--isa");
   if (options.on_frame)
     throw InputError(scene.name, fmt::format("frames are of timed runs: [run] {} has none", what));
 }

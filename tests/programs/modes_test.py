@@ -153,7 +153,8 @@ def test_what_is_refused():
         write("scene.toml", text)
         expect_error(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "x.vtu"), "flexel-simulate", fragment)
     write("scene.toml", scene("modes = 3", HELD))
-    expect_error(run("flexel-simulate", "scene.toml", "body.vtu", "--history", "h.csv", "-o", "x.vtu"), "flexel-simulate", "--history")
+    for option, value in (("--history", "h.csv"), ("--isa", "portable")):
+        expect_error(run("flexel-simulate", "scene.toml", "body.vtu", option, value, "-o", "x.vtu"), "flexel-simulate", option)
     expect_error(run("flexel", "deform", "beam.obj", "--scene", "scene.toml", "-o", "x.stl"), "flexel", "flexel-simulate")
 
 

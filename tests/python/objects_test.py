@@ -426,6 +426,9 @@ def test_what_is_of_another_class_is_named():
         check.assertNotIn("\n", str(caught.exception))
     with check.assertRaises(flexel.InputError):
         flexel.picture([])
+    import numpy as np
+
+    check.assertEqual(len(flexel.voxelize(part, size=0.0025, progress=np.bool_(False)).rest), len(body.rest))
 
 
 def test_a_path_is_read_to_its_end():
@@ -436,6 +439,9 @@ def test_a_path_is_read_to_its_end():
         with check.assertRaises(ValueError) as caught:
             call("box.ply\0.stl")
         check.assertIn("null character", str(caught.exception))
+        with check.assertRaises(ValueError) as caught:
+            call(b"box\xff.ply")
+        check.assertRegex(str(caught.exception), "^[^\n]+ is not UTF-8: [^\n]+$")
     check.assertTrue((flexel.read(b"box.ply", unit="m").vertices == part.vertices).all())
 
 

@@ -294,6 +294,38 @@ def test_a_fork_within_a_run_is_refused():
     check.assertEqual(len(refused().rest), 9 * 3 * 3)
 
 
+def test_a_fork_while_a_run_ends_is_refused():
+    """A run that is over keeps what it held until it has the GIL."""
+    flexel = module()
+    body, part, last_frame = box_body(flexel), flexel.Part.from_mesh(*box()), threading.Event()
+
+    def refused():
+        try:
+            return flexel.voxelize(part, size=0.005)
+        except flexel.InputError as error:
+            return error
+
+    def hear(frame):
+        if frame.time > 0.9e-4:
+            last_frame.set()
+
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(60)  # nobody takes the GIL from this thread
+    try:
+        run = threading.Thread(target=lambda: flexel.simulate(body, SWING.replace("TIME", "0.1 ms"), on_frame=hear))
+        run.start()
+        check.assertTrue(last_frame.wait(60))
+        until = time.monotonic() + 1
+        while time.monotonic() < until:  # the run ends meanwhile
+            pass
+        said = told_by_a_fork(refused)
+    finally:
+        sys.setswitchinterval(before)
+    run.join()
+    check.assertIn("forked while a run went on", said)
+    check.assertEqual(len(refused().rest), 9 * 3 * 3)
+
+
 def test_nothing_on_stderr_without_a_terminal():
     module()
     code = ("import sys\nsys.path.insert(0, %r)\nimport flexel, shared\n"
