@@ -26,6 +26,12 @@ Body coarser_cells(const Body& body) {
   if (body.element_columns.contains("velocity"))
     throw InputError(
         "the body moves: a lattice of cells is coarsened at rest (model \"paper\" keeps its state)");
+  if (body.element_columns.contains("temperature"))
+    throw InputError("the body has temperatures, which a coarser one would lose: coarsen it before the run");
+  for (const char* note : {"carved", "stuck"})
+    if (body.notes.contains(note))
+      throw InputError(fmt::format(
+          "the body's note \"{}\" names places of its lattice, which a coarser one does not have", note));
   Body coarse = simulate::coarsened(body);
   coarse.surface = body.surface;
   coarse.notes = body.notes;
@@ -52,7 +58,7 @@ int coarsen_command(int argc, char** argv) {
   CommandLine app{
       "Writes a body on a lattice of twice the spacing. Of model \"paper\" (centre placement) each 2 x 2 x 2 "
       "elements become "
-      "one, with the sum of their masses and their mean displacement and velocity; a lattice of cells is "
+      "one, with the sum of their masses, moved and moving as they are; a lattice of cells is "
       "coarsened at rest.",
       "flexel coarsen"};
   std::string input = "-", output = "-";

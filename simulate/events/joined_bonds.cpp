@@ -1,6 +1,8 @@
 // Of the coarser part's surface points, in a grid of its spacing, the polygons of those around a point are tried.
 #include "simulate/events/joined_bonds.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -10,6 +12,7 @@
 
 #include "base/error.h"
 #include "base/math/distance.h"
+#include "base/program/progress.h"
 #include "formats/lattice/locate.h"
 #include "simulate/matter/surface_points.h"
 
@@ -81,6 +84,11 @@ class MovedCarrier {
     }
     return std::nullopt;
   }
+  // One element of model `paper` on its own along some axis, whose neighbours do not say where its surface is.
+  [[nodiscard]] bool is_flat(const Vec3& rest) const {
+    constexpr double kNoVolume = 1e-9;
+    return part_.placement == Placement::centre && !(std::abs(gradient(rest).determinant()) > kNoVolume);
+  }
   // A normal at rest, as it is turned now.
   [[nodiscard]] Vec3 turned(const Vec3& rest, const Vec3& normal) const {
     return (gradient(rest).inverse().transpose() * normal).normalized();
@@ -145,15 +153,18 @@ class SampleGrid {
 class JoinedBonds {
  public:
   JoinedBonds(const Problem& problem, const State& state);
-  // Appends the points in which two parts touch within a distance [m].
-  void touch(std::uint32_t a, std::uint32_t b, double gap, std::vector<FusedPoint>& points) const;
+  // Appends the points in which two parts touch within a distance [m]; adds to `flat` those of the two that have elements
+  // there of which that cannot be told.
+  void touch(std::uint32_t a, std::uint32_t b, double gap, std::vector<FusedPoint>& points,
+             std::set<std::uint32_t>& flat) const;
 
  private:
   struct Touching {
     double distance = 0;  // m, at rest, of the polygon
     InterpolationWeights weights;
   };
-  [[nodiscard]] std::vector<MovedSample> samples(std::uint32_t part, const Box& near) const;
+  [[nodiscard]] std::vector<MovedSample> samples(std::uint32_t part, const Box& near,
+                                                 std::set<std::uint32_t>& flat) const;
   [[nodiscard]] std::optional<Touching> touching(const MovedSample& point, const Vec3& normal,
                                                  const MovedSample& other, double limit) const;
   [[nodiscard]] double distance(const Vec3& rest, std::uint32_t polygon) const;
@@ -189,7 +200,8 @@ JoinedBonds::JoinedBonds(const Problem& problem, const State& state)
 }
 
 // Points of a part's surface that are in a box now.
-std::vector<MovedSample> JoinedBonds::samples(std::uint32_t part, const Box& near) const {
+std::vector<MovedSample> JoinedBonds::samples(std::uint32_t part, const Box& near,
+                                              std::set<std::uint32_t>& flat) const {
   constexpr std::size_t kAtATime = 16384;  // triangles: of their points few are near
   std::vector<MovedSample> found;
   std::vector<std::uint32_t> chosen;
@@ -198,7 +210,10 @@ std::vector<MovedSample> JoinedBonds::samples(std::uint32_t part, const Box& nea
       const MovedCarrier carrier(problem_, state_, point.polygon, point.position, point.area_vector);
       if (!carrier.found()) continue;
       const Vec3 now = carrier.now(point.position);
-      if ((now.array() >= near.min.array()).all() && (now.array() <= near.max.array()).all())
+      if (!(now.array() >= near.min.array()).all() || !(now.array() <= near.max.array()).all()) continue;
+      if (carrier.is_flat(point.position))
+        flat.insert(part);
+      else
         found.push_back({point, now});
     }
     chosen.clear();
@@ -260,15 +275,19 @@ double JoinedBonds::foundation(std::uint32_t a, std::uint32_t b) const {
   return Bonds::kPenalty * std::min(of(a), of(b));
 }
 
-void JoinedBonds::touch(std::uint32_t a, std::uint32_t b, double gap, std::vector<FusedPoint>& points) const {
+void JoinedBonds::touch(std::uint32_t a, std::uint32_t b, double gap, std::vector<FusedPoint>& points,
+                        std::set<std::uint32_t>& flat) const {
   const auto spacing = [&](std::uint32_t part) { return body_.parts[part].lattice.spacing; };
   const bool first = spacing(a).mean() <= spacing(b).mean();
   const std::uint32_t finer = first ? a : b, coarser = first ? b : a;
   const double limit = std::max(gap, touching_distance(diagonal_, spacing(finer).minCoeff()));
   const double width = spacing(coarser).maxCoeff() + limit;
   const Box around_finer{box_[finer].min.array() - width, box_[finer].max.array() + width};
-  const SampleGrid facing(samples(coarser, around_finer), width);
-  for (const MovedSample& point : samples(finer, box_[coarser])) {
+  if ((around_finer.min.array() > box_[coarser].max.array()).any() ||
+      (around_finer.max.array() < box_[coarser].min.array()).any())
+    return;
+  const SampleGrid facing(samples(coarser, around_finer, flat), width);
+  for (const MovedSample& point : samples(finer, box_[coarser], flat)) {
     const Vec3& rest = point.point.position;
     const MovedCarrier own(problem_, state_, point.point.polygon, rest, point.point.area_vector);
     const Vec3 normal = own.turned(rest, point.point.area_vector.normalized());
@@ -309,7 +328,8 @@ void soften_points(const Problem& problem, std::vector<FusedPoint>& points) {
 }  // namespace
 
 std::vector<FusedPoint> joined_bonds(const Problem& problem, const State& state, std::uint32_t first,
-                                     const Bonds::Parameters& bonds, const std::vector<FusedPoint>& fused) {
+                                     const Bonds::Parameters& bonds, const std::vector<FusedPoint>& fused,
+                                     Progress& progress) {
   const Body& body = problem.body;
   std::vector<FusedPoint> points;
   std::set<PartPair> held;
@@ -318,14 +338,23 @@ std::vector<FusedPoint> joined_bonds(const Problem& problem, const State& state,
     for (const std::uint32_t e : point.elements) held.insert(pair_of(part_of[point.elements[0]], part_of[e]));
   const std::vector<TouchingGap> named = Bonds::named_gaps(bonds, body);
   const JoinedBonds search(problem, state);
+  std::set<std::uint32_t> warned;
   for (std::uint32_t b = first; b < body.parts.size(); ++b)
     for (std::uint32_t a = 0; a < b; ++a) {
       const auto given = std::find_if(named.begin(), named.end(),
                                       [&](const TouchingGap& each) { return each.parts == pair_of(a, b); });
       if (held.contains({a, b}) || (!bonds.bond && given == named.end())) continue;
       const std::size_t before = points.size();
-      search.touch(a, b, given == named.end() ? 0 : given->gap, points);
-      if (given != named.end() && points.size() == before)
+      std::set<std::uint32_t> flat;
+      search.touch(a, b, given == named.end() ? 0 : given->gap, points, flat);
+      if (points.size() > before) continue;
+      for (const std::uint32_t part : flat)
+        if (warned.insert(part).second)
+          progress.warn(
+              fmt::format("part \"{}\" is one element thick near another part, and what joins is not bonded "
+                          "to such elements; a \"fuse\" at the same time can hold them together",
+                          body.parts[part].name));
+      if (given != named.end())
         Bonds::refuse_apart(bonds.named[static_cast<std::size_t>(given - named.begin())]);
     }
   soften_points(problem, points);

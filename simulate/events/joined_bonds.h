@@ -10,12 +10,18 @@
 #include "formats/lattice/fused_points.h"
 #include "simulate/effects/bonds.h"
 
+namespace flexel {
+class Progress;
+}
+
 namespace flexel::simulate {
 
-// Of parts from number `first` on, which have just joined, with all the others and each other: those that `bonds` bonds.
-// Pairs that have points in `fused` already are left out. Throws InputError: parts that a [[bond]] names do not touch.
+// Of parts from number `first` on, which have just joined, with all the others and each other: those that
+// `bonds` bonds. Pairs that have points in `fused` already are left out. Warns of parts of model `paper` that
+// are one element thick where another is near: neighbours do not tell where the surface of those is, and they
+// are not bonded. Throws InputError: parts that a [[bond]] names do not touch.
 [[nodiscard]] std::vector<FusedPoint> joined_bonds(const Problem& problem, const State& state,
                                                    std::uint32_t first, const Bonds::Parameters& bonds,
-                                                   const std::vector<FusedPoint>& fused);
+                                                   const std::vector<FusedPoint>& fused, Progress& progress);
 
 }  // namespace flexel::simulate

@@ -11,6 +11,7 @@
 
 #include "base/disjoint_sets.h"
 #include "base/error.h"
+#include "simulate/matter/interpolation_weights.h"
 #include "simulate/models/rest_shape.h"
 
 namespace flexel::simulate {
@@ -20,7 +21,7 @@ constexpr std::size_t kDirectionBits = half_neighbourhood.size();
 constexpr double kEightElements = 8;
 
 // How numbers of elements or connections become one.
-enum class Merging { share, mean, mean_by_mass, mean_by_stiffness, harmonic, least, twice };
+enum class Merging { share, mean, mean_by_mass, mean_by_stiffness, led, harmonic, least, twice };
 struct MergedColumn {
   const char* name;
   Merging how;
@@ -35,7 +36,7 @@ constexpr MergedColumn kOfElements[] = {{"density_change", Merging::share, true}
                                         {"radius_change", Merging::mean, true},
                                         {"stick_change", Merging::mean, false},
                                         {"plastic_strain", Merging::mean, false},
-                                        {"settled", Merging::mean_by_mass, false},
+                                        {"settled", Merging::led, false},
                                         {"velocity", Merging::mean_by_mass, false}};
 constexpr MergedColumn kOfConnections[] = {{"connection_stiffness_change", Merging::harmonic, true},
                                            {"connection_damping_change", Merging::mean, true},
@@ -104,6 +105,7 @@ class MergedElements {
   [[nodiscard]] Vec3 lowest(const Part& part) const;
   [[nodiscard]] std::pair<std::uint32_t, std::size_t> place_of(std::uint32_t a, std::uint32_t b) const;
   void merge_columns();
+  [[nodiscard]] std::vector<double> led(const std::vector<double>& displacement) const;
   void merge_connections();
   [[nodiscard]] double weight(Merging how, std::uint32_t element) const;
   [[nodiscard]] std::vector<double> merged_connections(const MergedColumn& column,
@@ -201,9 +203,23 @@ void MergedElements::group(const Part& part) {
 }
 
 double MergedElements::weight(Merging how, std::uint32_t element) const {
-  return how == Merging::mean_by_mass        ? mass_[element]
-         : how == Merging::mean_by_stiffness ? stiffness_[element]
-                                             : 1;
+  return how == Merging::mean_by_mass || how == Merging::led ? mass_[element]
+         : how == Merging::mean_by_stiffness                 ? stiffness_[element]
+                                                             : 1;
+}
+
+// Where a group lacks elements, its middle is not the middle of those it has: what they do there.
+std::vector<double> MergedElements::led(const std::vector<double>& displacement) const {
+  const Problem problem{fine_, {}, {}};
+  std::vector<double> there(displacement.size(), 0);
+  for (std::uint32_t e = 0; e < fine_.element_count(); ++e) {
+    const InterpolationWeights at = with_gradient(problem, {{e}, {1}, 1}, coarse_.rest[group_[e]]);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      for (std::uint32_t n = 0; n < at.count; ++n)
+        there[3 * std::size_t{e} + axis] +=
+            at.weights[n] * displacement[3 * std::size_t{at.elements[n]} + axis];
+  }
+  return there;
 }
 
 void MergedElements::merge_columns() {
@@ -224,16 +240,22 @@ void MergedElements::merge_columns() {
     if (!given && column.how != Merging::share) continue;
     const auto width = given ? static_cast<std::size_t>(found->second.components) : 1;
     const double one = column.is_factor ? 1 : 0;
+    const std::vector<double>* own = given ? &found->second.values : nullptr;
+    std::vector<double> there;
+    if (column.how == Merging::led) own = &(there = led(*own));
     std::vector<double> values =
-        merged(column, width, [&](std::size_t i) { return given ? one + found->second.values[i] : 1; });
+        merged(column, width, [&](std::size_t i) { return own ? one + (*own)[i] : 1; });
     for (double& each : values) each -= one;
     const bool any = std::any_of(values.begin(), values.end(), [](double each) { return each != 0; });
     if (given || any) coarse_.element_columns[column.name] = {static_cast<int>(width), std::move(values)};
   }
-  const std::vector<double> moved = merged({"", Merging::mean_by_mass, false}, 3, [&](std::size_t i) {
-    const auto axis = static_cast<Eigen::Index>(i % 3);
-    return fine_.position[i / 3][axis] - fine_.rest[i / 3][axis];
-  });
+  std::vector<double> displacement;
+  for (std::uint32_t e = 0; e < fine_.element_count(); ++e)
+    for (Eigen::Index axis = 0; axis < 3; ++axis)
+      displacement.push_back(fine_.position[e][axis] - fine_.rest[e][axis]);
+  displacement = led(displacement);
+  const std::vector<double> moved =
+      merged({"", Merging::led, false}, 3, [&](std::size_t i) { return displacement[i]; });
   for (std::uint32_t e = 0; e < coarse_.element_count(); ++e)
     coarse_.position.push_back(coarse_.rest[e] + Eigen::Map<const Vec3>(&moved[3 * std::size_t{e}]));
 }

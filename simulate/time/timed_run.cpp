@@ -357,7 +357,7 @@ void TimedRun::bond_joined(std::size_t first, const State& state) {
   note_joined_parts(body_, first);
   const std::vector<FusedPoint> bonds =
       joined_bonds(timed_problem(body_, scene_, start_), state, static_cast<std::uint32_t>(first),
-                   without_coming_parts(scene_, body_).get<Bonds>(), start_.fused);
+                   without_coming_parts(scene_, body_).get<Bonds>(), start_.fused, progress_);
   start_.fused.insert(start_.fused.end(), bonds.begin(), bonds.end());
   if (!bonds.empty())
     progress_.say(fmt::format("what came is bonded where it touches, in {} points", bonds.size()));

@@ -1,6 +1,8 @@
 // Scenes as the runs of a study want them.
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "base/error.h"
 #include "flexel/study/runs/history_csv.h"
 #include "flexel/study/runs/scene_edit.h"
@@ -109,6 +111,15 @@ TEST(StudyHistory, AShiftedMotionLagsByTheShift) {
   EXPECT_NEAR(*lag(time, reference, time, reference), 0, 1e-6);
   const std::vector<double> still(time.size(), 0.0);
   EXPECT_FALSE(lag(time, motion, time, still));
+}
+
+// A probe of a part that comes later has no number before: nan in the history.
+TEST(StudyScene, ThePeakIsOfTheRowsThatHaveANumber) {
+  const double none = std::nan("");
+  EXPECT_EQ(*peak({none, none, 2, 3, 1}), 3);
+  EXPECT_EQ(*peak({1, 2}), 2);
+  EXPECT_FALSE(peak({none, none}));
+  EXPECT_FALSE(peak({}));
 }
 
 }  // namespace

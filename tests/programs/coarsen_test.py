@@ -64,6 +64,16 @@ def test_a_deformed_body_keeps_its_state():
     expect_error(run("flexel", "coarsen", "out.vtu", "-o", "no.vtu"), "flexel", "coarsened at rest")
 
 
+def test_cells_at_rest_are_mapped_and_carved_ones_refused():
+    voxelized("corner", "2 mm", "fine.vtu")
+    expect_ok(run("flexel", "coarsen", "fine.vtu", "-o", "made.vtu", "--quiet"))
+    expect_ok(run("flexel-map", "made.vtu", "-o", "made.stl", "--quiet"))
+    carve = '[[event]]\ndo = "carve"\nwhere = { sphere = { centre = ["40 mm", "8 mm", "16 mm"], radius = "5 mm" } }\n'
+    bare = "\n".join(line for line in BENT.splitlines() if not line.startswith(("[[load", "force"))).replace('where = "xmax"\n[[probe', "[[probe")
+    expect_ok(run("flexel-simulate", scene("carved.toml", bare + "\n" + carve), "fine.vtu", "-o", "carved.vtu", "--quiet", "--force"))
+    expect_error(run("flexel", "coarsen", "carved.vtu", "-o", "no.vtu"), "flexel", "carved")
+
+
 def test_what_it_refuses():
     voxelized("corner", "4 mm", "fine.vtu")
     expect_error(run("flexel", "coarsen", "fine.vtu", "-o", "fine.vtu"), "flexel", "--force")

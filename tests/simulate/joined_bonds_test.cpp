@@ -189,6 +189,30 @@ TEST(JoinedBonds, ABondNamesAPartThatComes) {
   EXPECT_FALSE(fused_points(made.body).empty());
 }
 
+// A plate of one element: its neighbours do not tell where its faces are. It comes as it is, and the run says so.
+TEST(JoinedBonds, APlateOfOneElementIsToldOf) {
+  const flexel::test::Scratch scratch;
+  const auto centre = [](const std::string& name, double from, int thick) {
+    testing::CentreOptions options;
+    options.voxels = {thick, 3, 3};
+    options.spacing = 1e-2;
+    options.origin = Vec3(from, 0, 0);
+    options.name = name;
+    return centre_body(options);
+  };
+  write_body(centre("right", 4e-2, 1), scratch.path("right.vtu"));
+  const auto told = [&](double from) {
+    ::testing::internal::CaptureStderr();
+    const TimedCase made =
+        run_timed(centre("left", from, 4), late_gum_scene("model = \"paper\"\n[run]\ntime = \"1 ms\"\n" +
+                                                          late_add_at("0 s", scratch.path("right.vtu"))));
+    EXPECT_TRUE(fused_points(made.body).empty());
+    return ::testing::internal::GetCapturedStderr();
+  };
+  EXPECT_THAT(told(0), HasSubstr("\"right\" is one element thick"));
+  EXPECT_THAT(told(-1), ::testing::Not(HasSubstr("one element thick")));
+}
+
 // Before its part comes a probe has no number; names are fields of the history as RFC 4180 has them.
 TEST(JoinedBonds, AProbeSelectsAPartThatComes) {
   const flexel::test::Scratch scratch;

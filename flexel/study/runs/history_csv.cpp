@@ -60,6 +60,13 @@ std::vector<double> probe_motion(const History& history, const std::string& prob
   return motion;
 }
 
+std::optional<double> peak(const std::vector<double>& motion) {
+  std::optional<double> most;
+  for (const double each : motion)
+    if (std::isfinite(each)) most = std::max(most.value_or(each), each);
+  return most;
+}
+
 std::optional<double> lag(const std::vector<double>& time, const std::vector<double>& motion,
                           const std::vector<double>& reference_time, const std::vector<double>& reference) {
   if (time.size() < 2 || reference_time.size() < 2 || motion.size() != time.size() ||

@@ -19,6 +19,9 @@ struct History {
 // Length of the displacement of a probe over time [m]; empty where there is no such probe.
 [[nodiscard]] std::vector<double> probe_motion(const History& history, const std::string& probe);
 
+// The largest of it, rows without a number left out; nothing where there is none.
+[[nodiscard]] std::optional<double> peak(const std::vector<double>& motion);
+
 // The time [s] by which `motion` lags `reference` (both of the same probe): the shift, up to a quarter of the
 // shorter run, at which the mean squared difference is least; nothing where the reference does not move.
 [[nodiscard]] std::optional<double> lag(const std::vector<double>& time, const std::vector<double>& motion,

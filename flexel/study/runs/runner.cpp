@@ -206,9 +206,8 @@ class Run {
   void take_history(const std::string& path) {
     const History history = read_history(path);
     for (const std::string& probe : scene_facts(case_.scene_text, case_.scene).probes) {
-      const std::vector<double> motion = probe_motion(history, probe);
-      if (!motion.empty())
-        result_.quantities.push_back({probe + " peak", "m", *std::max_element(motion.begin(), motion.end())});
+      if (const std::optional<double> most = peak(probe_motion(history, probe)))
+        result_.quantities.push_back({probe + " peak", "m", *most});
     }
   }
 
