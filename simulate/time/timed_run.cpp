@@ -63,7 +63,8 @@ class TimedRun {
   void enter_half_step();
   void apply(std::size_t end);
   void bond_joined(std::size_t first, const State& state);
-  void warn_of_unsure_fits();
+  [[nodiscard]] std::string unsure_fits() const;
+  void warn_of_unsure_fits(const std::string& told = "");  // unless that is all
   void check();
   void step();
   void advance(bool row);
@@ -165,10 +166,14 @@ void TimedRun::begin() {
                     stuck.size() - found, stuck.size()));
 }
 
-void TimedRun::warn_of_unsure_fits() {
+std::string TimedRun::unsure_fits() const {
   for (const ActiveEffect& effect : segment_->effects())
-    if (const auto* contact = dynamic_cast<const Contact*>(&effect.untimed()))
-      if (const std::string told = contact->unsure_fits(); !told.empty()) progress_.warn(told);
+    if (const auto* contact = dynamic_cast<const Contact*>(&effect.untimed())) return contact->unsure_fits();
+  return "";
+}
+
+void TimedRun::warn_of_unsure_fits(const std::string& told) {
+  if (const std::string line = unsure_fits(); !line.empty() && line != told) progress_.warn(line);
 }
 
 void TimedRun::resume(const Checkpoint& from) {
@@ -381,6 +386,7 @@ void TimedRun::apply(std::size_t end) {
   start_.fused = segment_->fused();
   State state = segment_->state();
   start_.fresh = false;
+  const std::string unsure = unsure_fits();
   segment_.reset();
   const bool was_edited = edits_damping(body_);
   const std::size_t parts = body_.parts.size();
@@ -405,7 +411,7 @@ void TimedRun::apply(std::size_t end) {
   }
   segment_.emplace(body_, scene_, options_, progress_, start_, std::move(state));
   sound_.keep(segment_->state());  // of the elements that there are now
-  if (body_.parts.size() > parts) warn_of_unsure_fits();
+  if (body_.parts.size() > parts) warn_of_unsure_fits(unsure);
   if (!was_edited && edits_damping(body_) && !segment_->damps())
     progress_.warn("edit: the scene has no [damping] that \"damping\" could change");
   segment_->set_hear([this](const std::string& note) { listen(note); });

@@ -158,6 +158,19 @@ def test_a_fit_that_facets_hide_is_told():
         expect(told(offset, radius) == [], f"{offset} {radius}")
 
 
+def test_a_fit_that_facets_hide_is_told_once():
+    need_step()
+    need("gmsh")
+    write("fitted.geo", BOLTED.split("Cylinder(4)")[0].replace("0, 0, 7, 4", "0, 0, 7, 3") + 'Cylinder(4) = {.02, 0, -6, 0, 0, 15, 3};\nSave "fitted.step";\n')
+    write("far.geo", 'SetFactory("OpenCASCADE");\nBox(1) = {0, 0, 50, 6, 6, 6};\nSave "far.step";\n')
+    for name in "fitted", "far":
+        run("gmsh", f"{name}.geo", "-0", "-v", "1")
+        expect_ok(run("flexel-voxelize", f"{name}.step", "--size", "2 mm", "-o", f"{name}.vtu", "--quiet"))
+    scene("fit.toml", 'material = "PLA"\n[contact]\noverlap = "part"\noverlap_time = "1 us"\n[run]\ntime = "2 us"\n[[event]]\nat = "1 us"\ndo = "add"\nbody = "far.vtu"\n' + HELD)
+    said = expect_ok(run("flexel-simulate", "fit.toml", "fitted.vtu", "-o", "pressed.vtu", "--quiet")).err
+    expect(said.count("fit each other") == 1, f"a part that comes leaves the fit as it was: {said}")
+
+
 def test_names_of_assemblies_stand_for_their_parts():
     need_step()
     part = PARTS / "as1-oc-214.stp"

@@ -249,6 +249,13 @@ TEST(Contact, APressFitPressesByItsInterference) {
     }
 }
 
+std::vector<UnsureFit> unsure_of(const Body& body) {
+  const Problem problem = problem_of(body);
+  ContactSettings settings = all_parts(body);
+  settings.release_time = 0.01;
+  return Contacts(std::move(settings), problem).unsure_fits();
+}
+
 // A pin of `sides[1]` sides in the hole of a plate of `sides[0]`.
 struct PinInHole {
   double radius, offset, interference;  // spacings
@@ -282,13 +289,7 @@ struct PinInHole {
     return sum;
   }
 
-  [[nodiscard]] std::vector<UnsureFit> unsure() const {
-    const Body made = body(true);
-    const Problem problem = problem_of(made);
-    ContactSettings settings = all_parts(made);
-    settings.release_time = 0.01;
-    return Contacts(std::move(settings), problem).unsure_fits();
-  }
+  [[nodiscard]] std::vector<UnsureFit> unsure() const { return unsure_of(body(true)); }
 };
 
 // A pin that is not in the middle of its hole presses as one that is pushed there, however few cells its radius has: the
@@ -334,6 +335,35 @@ TEST(Contact, AFitIsNotToldWhereItIsSure) {
                                {2.7, 0.2, 0, {18, 16}},
                                {2.7, 0, -0.06, {18, 16}}})  // a clearance
     EXPECT_TRUE(pin.unsure().empty()) << pin.radius << " " << pin.offset << " " << pin.interference;
+}
+
+// It touches the plate along a line.
+TEST(Contact, ARollerOnAPlateIsNoFit) {
+  for (const double radius : {1.6, 2.5, 4.0})
+    for (const std::uint32_t sides : {16u, 40u}) {
+      Body body = cut_block("plate", {10, 3, 8}, kSide * Vec3(-5, -3 - radius, -1));
+      append(body, prism(block("roller", {10, 10, 6}, kSide * Vec3(-5, -5, 0)), sides, radius * kSide, 0,
+                         0.5 * kSide, 5.5 * kSide));
+      EXPECT_TRUE(unsure_of(body).empty()) << radius << " " << sides;
+    }
+}
+
+TEST(Contact, AFitIsToldInWhateverOrderThePartsAre) {
+  const auto plate = [](const std::string& name, double low) {
+    return prism(block(name, {12, 12, 4}, kSide * Vec3(-6, -6, low - 0.5)), 40, 5 * kSide, 1.6 * kSide,
+                 low * kSide, (low + 3) * kSide);
+  };
+  Body pin = prism(block("pin", {8, 8, 10}, kSide * Vec3(-4, -4, -2)), 40, 1.6 * kSide, 0, -1.2 * kSide,
+                   7.2 * kSide);
+  for (Vec3& vertex : pin.surface.vertices)
+    vertex = turn(0.07, Vec3::UnitZ()) * vertex + 0.012 * kSide * PinInHole::kWay;
+  Body last = plate("below", 0), first = pin;
+  append(last, plate("above", 3));
+  append(last, pin);
+  append(first, plate("below", 0));
+  append(first, plate("above", 3));
+  EXPECT_EQ(unsure_of(last).size(), 2);
+  EXPECT_EQ(unsure_of(first).size(), 2);
 }
 
 TEST(Contact, AFitIsToldWithItsSize) {

@@ -114,24 +114,27 @@ bool is_unsure(const WholeOverlap& whole, double width) {
          whole.size + 0.5 * whole.scatter > kNegligible * width;
 }
 
-// Parts of which a quarter of what fits or more is unsure.
+// Parts of which a quarter of what fits or more is unsure. Curved surfaces alone fit each other: a roller on a plate does not.
 std::vector<UnsureFit> unsure_fits(const std::vector<FacingPair>& pairs, const std::vector<RestFit>& fits,
                                    const std::vector<WholeOverlap>& wholes,
-                                   const std::vector<ContactPoint>& points) {
+                                   const std::vector<std::uint8_t>& curved, const ContactSurface& surface) {
   constexpr double kShare = 0.25;
   struct Weights {
     double all = 0, unsure = 0, squares = 0, width = 0;  // N/m; N/m; N m; m
   };
   std::map<std::array<std::uint32_t, 2>, Weights> of_parts;
   for (const FacingPair& pair : pairs) {
-    const ContactPoint &a = points[pair.i], &b = points[pair.j];
-    if (!fits[pair.i].is_one) continue;
-    Weights& sum = of_parts[{std::min(a.part, b.part), std::max(a.part, b.part)}];
-    sum.all += pair.weight;
-    sum.width = a.width;
-    if (!is_unsure(wholes[pair.i], a.width)) continue;
-    sum.unsure += pair.weight;
-    sum.squares += pair.weight * wholes[pair.i].size * wholes[pair.i].size;
+    const std::uint32_t a = surface.points()[pair.i].part, b = surface.points()[pair.j].part;
+    if (!curved[pair.i] || !curved[pair.j] || (surface.prescribed(a) && surface.prescribed(b))) continue;
+    for (const std::uint32_t point : {pair.i, pair.j}) {
+      if (!fits[point].is_one) continue;
+      Weights& sum = of_parts[{std::min(a, b), std::max(a, b)}];
+      sum.all += pair.weight;
+      sum.width = surface.points()[point].width;
+      if (!is_unsure(wholes[point], sum.width)) continue;
+      sum.unsure += pair.weight;
+      sum.squares += pair.weight * wholes[point].size * wholes[point].size;
+    }
   }
   std::vector<UnsureFit> unsure;
   for (const auto& [parts, sum] : of_parts)
@@ -236,7 +239,7 @@ void RestOverlaps::find_fits(const ContactMaterials& materials, const ExcludedPa
     if (whole.size > kScatter * whole.scatter) fits_[i] = whole.fit;
     fits_[i].is_one = true;
   }
-  unsure_ = unsure_fits(pairs, fits_, wholes, points);
+  unsure_ = unsure_fits(pairs, fits_, wholes, curved_, surface_);
   spread_to_rims(at, is_paired);
 }
 
