@@ -295,6 +295,49 @@ struct Candidate {
 struct SmallNotch {
   ReEntrantEdge edge;
   double radius = 0;  // m
+  // Between the ends of the edge, where the run has most: Pa, 0 on a short edge
+  double most = 0;
+  Vec3 most_at = Vec3::Zero();
+};
+
+// The run's stresses between the ends of edges: a fillet along a part has vertices at its ends alone.
+class StressAlongEdges {
+ public:
+  StressAlongEdges(const Body& body, const Lattice& lattice, const Stresses& field)
+      : lattice_(lattice), field_(field) {
+    for (std::uint32_t e = 0; e < body.element_count(); ++e) of_.emplace(body.lattice_index[e], e);
+  }
+  // Of points less than a spacing apart that count, each of the elements around it.
+  void find(const std::function<bool(const Vec3&)>& counts, SmallNotch& notch) const {
+    notch.most = 0;
+    const auto& [a, b] = notch.edge.ends;
+    const double parts = std::ceil((b - a).norm() / lattice_.spacing.minCoeff());
+    for (double k = 1; k < parts; ++k) {
+      const Vec3 at = a + k / parts * (b - a);
+      const double value = around(at);
+      if (value > notch.most && counts(at)) notch.most = value, notch.most_at = at;
+    }
+  }
+
+ private:
+  [[nodiscard]] double around(const Vec3& at) const {
+    const Vec3 inside = lattice_.to_lattice(at);
+    double most = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+      Index3 index;
+      for (int axis = 0; axis < 3; ++axis)
+        index[static_cast<std::size_t>(axis)] =
+            static_cast<std::int32_t>(std::floor(inside[axis])) + ((corner >> axis) & 1);
+      const auto [first, last] = of_.equal_range(index);
+      for (auto each = first; each != last; ++each)
+        if ((field_.element_at[each->second] - at).norm() <= lattice_.spacing.maxCoeff())
+          most = std::max(most, von_mises(field_.element[each->second]));
+    }
+    return most;
+  }
+  const Lattice lattice_;
+  const Stresses& field_;
+  std::multimap<Index3, std::uint32_t> of_;  // elements, by where they are
 };
 
 // How many times as large as the stress of coarse cells its peak may be, of what was measured: near 3 at the smallest holes, more at the fillet of a step,
@@ -395,6 +438,7 @@ class CloserLook {
     }
     for (std::uint32_t e = 0; e < singular.size(); ++e)
       if (singular[e] >= 2) tied_.push_back(body().rest[e]);
+    find_along_notches();
   }
 
   LocalStressField operator()() {
@@ -410,6 +454,16 @@ class CloserLook {
  private:
   [[nodiscard]] const Body& body() const { return system_.problem().body; }
   [[nodiscard]] double spacing() const { return lattice_of(system_).spacing.maxCoeff(); }
+
+  // Before anything finer is merged.
+  void find_along_notches() {
+    if (notches_.empty()) return;
+    const StressAlongEdges along(body(), lattice_of(system_), merged_);
+    for (SmallNotch& each : notches_) {
+      check_stop();
+      along.find([this](const Vec3& at) { return !is_singular(at); }, each);
+    }
+  }
 
   // At the largest stress, and where there may be more, in a share of the time that is left: what was found is to be told.
   void look_around() {
@@ -481,6 +535,9 @@ class CloserLook {
         const double value = von_mises(merged_.vertex[each.edge.vertices[i]]);
         add(value, growth(each.radius) * value, 0, each.edge.ends[i]);
       }
+    for (const SmallNotch& each : notches_)
+      if (each.most > 0 && !was_seen_elsewhere(each))
+        add(each.most, growth(each.radius) * each.most, 0, each.most_at);
     std::sort(above.begin(), above.end(),
               [](const Candidate& a, const Candidate& b) { return a.may_be > b.may_be; });
     for (const Candidate& each : above) {
@@ -488,6 +545,13 @@ class CloserLook {
       if (!is_singular(each.at)) return each;
     }
     return std::nullopt;
+  }
+  // Somebody looked at another place along the notch, where the run has as much.
+  [[nodiscard]] bool was_seen_elsewhere(const SmallNotch& notch) const {
+    return std::any_of(places_.begin(), places_.end(), [&](const LookedPlace& each) {
+      return each.values.front() * (1 + kNarrow) >= notch.most &&
+             distance_to(notch.edge, each.largest.at) <= kBesideInField * spacing();
+    });
   }
   // How many times what the run's cells have at a notch the stress there may be: as at those of its radius that were looked at, the less beyond the more
   // these are; else as any notch.
@@ -550,6 +614,7 @@ class CloserLook {
   // Where the largest stress has no limit, the largest away from there.
   std::optional<Candidate> largest_beyond() {
     beyond_ = true;
+    find_along_notches();
     std::vector<std::pair<double, std::uint32_t>> falling;
     for (std::uint32_t e = 0; e < merged_.element.size(); ++e)
       if (const double value = von_mises(merged_.element[e]); value > 0) falling.emplace_back(-value, e);

@@ -314,6 +314,7 @@ TEST(LocalStress, FindsANotchThatTheRunHasTooLow) {
 
 // Half of the time that is left is for what comes after the look.
 TEST(LocalStress, LeavesHalfOfTheTime) {
+  if (sanitized()) GTEST_SKIP() << "its time limit is for programs of usual speed";
   const Mesh bar = voxelize::shapes::box(Vec3(0, 0, 0), Vec3(0.1, 0.0367, 0.0283));
   const std::string scene = std::string(kQuarter) + kDrawn;
   const Ran alone = ran(bar, 0.0142, scene, false);

@@ -138,6 +138,42 @@ def test_a_closer_look_at_a_hole():
     expect(abs(max(mapped(meshio).point_data["von_mises"]) / found - 1) < 1e-9, "the mapped surface's largest")
 
 
+def channel(name, width, floor, top, length, radii, middle):
+    """Walls of 6 along z, with fillets of these radii at their feet, each of its own facets; groups: held, left (its top), middle (of the right top)."""
+    left, right = radii
+    corner = lambda radius, centre, k, steps: (centre - radius * math.sin(0.5 * math.pi * k / steps), floor + radius - radius * math.cos(0.5 * math.pi * k / steps))
+    mine = [corner(left, 6 + left, k, 24) for k in range(25)]  # from the floor up
+    other = [(width - x, y) for x, y in (corner(right, 6 + right, k, 8) for k in range(9))]
+    outline = [(0, 0), (width, 0), (width, floor), (width, floor + right), (width, top), (width - 6, top), *other[::-1], *mine, (6, top), (0, top), (0, floor + left), (0, floor)]
+    n = len(outline)
+    first_other, first_mine = 6, 6 + len(other)
+    end = first_mine + len(mine)  # of the fillets: (6, top)
+    caps = [[0, 1, 2, first_mine - 1, first_mine, n - 1], [3, 4, 5, first_other], [n - 2, end - 1, end, end + 1], [2, 3, first_other], [n - 1, end - 1, n - 2]]
+    caps += [[2, k, k + 1] for k in range(first_other, first_mine - 1)] + [[n - 1, k, k + 1] for k in range(first_mine, end - 1)]
+    vertices = [(x, y, z) for z in (0, length) for x, y in outline] + [(x, top, z) for z in middle for x in (width, width - 6)]
+    a, b, c, d = range(2 * n, 2 * n + 4)
+    sides = {k: [k, (k + 1) % n, (k + 1) % n + n, k + n] for k in range(n)}
+    groups = {"held": [sides.pop(0)], "left": [sides.pop(end)], "middle": [[a, b, d, c]]}
+    del sides[4]
+    sides[3] = [3, 4, a, c, 4 + n, 3 + n]
+    sides[5] = [6, 6 + n, 5 + n, d, b, 5]
+    groups["body"] = [*sides.values(), [4, 5, b, a], [c, d, 5 + n, 4 + n], *(face[::-1] for face in caps), *([k + n for k in face] for face in caps)]
+    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices]
+    for group, faces in groups.items():
+        lines += [f"g {group}"] + ["f " + " ".join(str(k + 1) for k in face) for face in faces]
+    return write(name, "\n".join(lines) + "\n")
+
+
+def test_a_closer_look_at_a_fillet_whose_vertices_are_at_its_ends():
+    """The small fillet has its peak in the middle of edges that run from end to end; what the run finds largest is at the wide one, and less than that."""
+    part = channel("channel.obj", 36, 12, 32, 72, (9, 0.8), (28, 44))
+    scene = MATERIAL + '[[fix]]\nwhere = "held"\n[[load]]\nwhere = "left"\nforce = ["-1000 N", 0, 0]\n[[load]]\nwhere = "middle"\nforce = ["250 N", 0, 0]\n'
+    summary, _ = look_closer(part, "4 mm", scene, "--no-estimate")
+    x, _, z = summary["largest_von_mises_at"]
+    expect(x > 0.029 and abs(z - 0.036) < 0.004, (x, z))
+    expect(summary["largest_von_mises_local"]["values"][-1] < 0.5 * summary["largest_von_mises"], summary)
+
+
 def test_a_closer_look_beside_a_clamp_finds_no_limit():
     part = write("bar.stl", ascii_stl(box_triangles((60, 10, 10))))
     summary, done = look_closer(part, "4 mm", MATERIAL + '[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = [0, 0, "-10 N"]\n')
