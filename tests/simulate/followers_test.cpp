@@ -503,9 +503,9 @@ double turn_of_the_end(double force) {
 }
 
 TEST(Followers, AForceAcrossBendsACantileverIntoTheElastica) {
-  constexpr double kForce = 8, kSide = 4e-3;
+  constexpr double kForce = 8, kThick = 4e-3;
   const double turn =
-      turn_of_the_end(kForce * kBarLength * kBarLength / (kBarYoung * std::pow(kSide, 4) / 12));
+      turn_of_the_end(kForce * kBarLength * kBarLength / (kBarYoung * std::pow(kThick, 4) / 12));
   EXPECT_GT(turn, 1);
   const Vec3 exact = kForce * Vec3(-std::sin(turn), 0, std::cos(turn));
   using Way = std::pair<const char*, const char*>;
