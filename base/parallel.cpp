@@ -1,3 +1,4 @@
+// oneTBB behind the loops of base/parallel.h.
 #include "base/parallel.h"
 
 #include <oneapi/tbb/blocked_range.h>

@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "base/error.h"
-#include "base/json.h"
+#include "base/files/json.h"
 #include "base/nearest_word.h"
 #include "base/parallel.h"
 #include "base/printable.h"

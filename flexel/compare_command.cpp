@@ -12,9 +12,9 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/json.h"
 #include "base/files/output_file.h"
 #include "base/human.h"
-#include "base/json.h"
 #include "base/parallel.h"
 #include "base/printable.h"
 #include "base/program/brief_output.h"

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/files/json.h"
 #include "base/files/output_file.h"
 #include "base/files/outputs.h"
 #include "base/human.h"
-#include "base/json.h"
 #include "base/math/area_vector.h"
 #include "base/parallel.h"
 #include "base/program/brief_output.h"

@@ -10,10 +10,10 @@
 #include <new>
 
 #include "base/files/files.h"
+#include "base/files/json.h"
 #include "base/files/output_file.h"
 #include "base/files/outputs.h"
 #include "base/human.h"
-#include "base/json.h"
 #include "base/parallel.h"
 #include "base/program/brief_output.h"
 #include "base/program/progress_stretch.h"

@@ -8,11 +8,11 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "base/files/json.h"
 #include "base/files/memory_file.h"
 #include "base/files/output_file.h"
 #include "base/human.h"
 #include "base/instruction_set.h"
-#include "base/json.h"
 #include "base/parallel.h"
 #include "base/program/arguments.h"
 #include "base/program/own_program.h"

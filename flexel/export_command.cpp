@@ -4,9 +4,9 @@
 #include <limits>
 
 #include "base/files/files.h"
+#include "base/files/json.h"
 #include "base/files/output_file.h"
 #include "base/files/outputs.h"
-#include "base/json.h"
 #include "base/nearest_word.h"
 #include "base/parallel.h"
 #include "base/program/progress_stretch.h"

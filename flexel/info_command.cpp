@@ -8,10 +8,10 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/files/json.h"
 #include "base/files/output_file.h"
 #include "base/files/outputs.h"
 #include "base/human.h"
-#include "base/json.h"
 #include "base/printable.h"
 #include "base/program/arguments.h"
 #include "base/program/brief_output.h"

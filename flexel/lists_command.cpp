@@ -6,8 +6,8 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/json.h"
 #include "base/files/output_file.h"
-#include "base/json.h"
 #include "base/program/arguments.h"
 #include "flexel/commands.h"
 #include "flexel/measure/materials_table.h"

@@ -10,8 +10,8 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/json.h"
 #include "base/files/output_file.h"
-#include "base/json.h"
 #include "base/nearest_word.h"
 #include "base/program/arguments.h"
 #include "base/program/progress.h"

@@ -8,9 +8,9 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/files/json.h"
 #include "base/files/output_file.h"
 #include "base/human.h"
-#include "base/json.h"
 #include "base/parallel.h"
 #include "base/resources.h"
 #include "base/units.h"

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/files/json.h"
 #include "base/human.h"
-#include "base/json.h"
 #include "base/units.h"
 #include "base/version.h"
 #include "simulate/probes/report.h"

@@ -1,6 +1,6 @@
 // The report as JSON.
 
-#include "base/json.h"
+#include "base/files/json.h"
 #include "voxelize/report.h"
 
 namespace flexel::voxelize {

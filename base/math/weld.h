@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "base/bucket.h"
+#include "base/math/parallel_sort.h"
 #include "base/parallel.h"
-#include "base/parallel_sort.h"
 
 namespace flexel {
 

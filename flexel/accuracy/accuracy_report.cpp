@@ -1,8 +1,8 @@
 // The report of the resolution search, as text and JSON.
 #include <fmt/format.h>
 
+#include "base/files/json.h"
 #include "base/human.h"
-#include "base/json.h"
 #include "base/units.h"
 #include "flexel/accuracy/accuracy_report.h"
 

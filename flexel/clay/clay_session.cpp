@@ -9,8 +9,8 @@
 #include <cstring>
 
 #include "base/error.h"
+#include "base/files/json.h"
 #include "base/files/temporary_folder.h"
-#include "base/json.h"
 #include "base/printable.h"
 #include "base/program/own_program.h"
 #include "base/stop.h"

@@ -1,7 +1,7 @@
 // The library of materials written out.
 #include <fmt/format.h>
 
-#include "base/json.h"
+#include "base/files/json.h"
 #include "base/units.h"
 #include "flexel/measure/materials_table.h"
 #include "simulate/input/materials.h"

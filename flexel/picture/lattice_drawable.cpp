@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "base/math/parallel_sort.h"
 #include "base/parallel.h"
-#include "base/parallel_sort.h"
 
 namespace flexel::picture {
 namespace {

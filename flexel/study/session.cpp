@@ -1,7 +1,7 @@
 // The loop: predict the open configurations, run the cheapest that fits the budget, write its row; then
 // repeat those whose time is not known to 5 %; then conclude.
 #include "flexel/study/session.h"
-#include "base/json.h"
+#include "base/files/json.h"
 #include "flexel/study/tables.h"
 
 #include <fmt/format.h>

@@ -2,7 +2,7 @@
 #include <fmt/format.h>
 
 #include "base/files/csv.h"
-#include "base/json.h"
+#include "base/files/json.h"
 #include "base/units.h"
 #include "flexel/study/study.h"
 #include "flexel/study/tables.h"

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <limits>
 
-#include "base/json.h"
+#include "base/files/json.h"
 
 namespace flexel::view {
 namespace {

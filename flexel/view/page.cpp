@@ -7,8 +7,8 @@
 #include <cmath>
 #include <map>
 
+#include "base/files/json.h"
 #include "base/files/output_file.h"
-#include "base/json.h"
 #include "base/printable.h"
 #include "base/units.h"
 #include "base/version.h"

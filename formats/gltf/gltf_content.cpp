@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "base/error.h"
-#include "base/json.h"
+#include "base/files/json.h"
 
 namespace flexel {
 namespace {

@@ -14,8 +14,8 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/files/json.h"
 #include "base/files/output_file.h"
-#include "base/json.h"
 #include "base/version.h"
 #include "formats/common/normal_change.h"
 #include "formats/common/surface_writers.h"

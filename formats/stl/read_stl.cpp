@@ -15,9 +15,9 @@
 
 #include "base/disjoint_sets.h"
 #include "base/error.h"
+#include "base/math/parallel_sort.h"
 #include "base/math/weld.h"
 #include "base/parallel.h"
-#include "base/parallel_sort.h"
 #include "formats/common/readers.h"
 
 namespace flexel {

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/files/json.h"
 #include "base/human.h"
-#include "base/json.h"
 #include "base/program/share_scope.h"
 #include "base/units.h"
 #include "base/version.h"

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "base/math/parallel_sort.h"
 #include "base/parallel.h"
-#include "base/parallel_sort.h"
 
 namespace flexel::simulate {
 namespace {

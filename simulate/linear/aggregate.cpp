@@ -10,8 +10,8 @@
 #include <map>
 #include <numeric>
 
+#include "base/math/parallel_sort.h"
 #include "base/parallel.h"
-#include "base/parallel_sort.h"
 
 namespace flexel::simulate {
 namespace {

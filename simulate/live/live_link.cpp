@@ -13,7 +13,7 @@
 
 #include "base/error.h"
 #include "base/files/append_text.h"
-#include "base/json.h"
+#include "base/files/json.h"
 #include "simulate/effects/rigid.h"
 
 namespace flexel::simulate {

@@ -1,6 +1,6 @@
 // What text of files may do to a terminal: nothing.
 #include "base/printable.h"
-#include "base/json.h"
+#include "base/files/json.h"
 
 #include <gtest/gtest.h>
 

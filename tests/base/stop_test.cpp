@@ -8,8 +8,8 @@
 #include <thread>
 
 #include "base/error.h"
+#include "base/math/parallel_sort.h"
 #include "base/parallel.h"
-#include "base/parallel_sort.h"
 #include "base/resources.h"
 
 namespace flexel {

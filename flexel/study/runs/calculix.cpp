@@ -13,7 +13,7 @@
 #include <sstream>
 
 #include "base/error.h"
-#include "base/json.h"
+#include "base/files/json.h"
 #include "base/program/own_program.h"
 
 namespace flexel::study {

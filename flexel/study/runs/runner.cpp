@@ -12,8 +12,8 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/json.h"
 #include "base/files/output_file.h"
-#include "base/json.h"
 #include "base/program/own_program.h"
 #include "flexel/study/runs/history_csv.h"
 #include "flexel/study/runs/scene_edit.h"

@@ -5,7 +5,7 @@
 #include <functional>
 #include <limits>
 
-#include "base/parallel_sort.h"
+#include "base/math/parallel_sort.h"
 
 namespace flexel::simulate {
 namespace {

@@ -1,4 +1,5 @@
-#include "base/json.h"
+// nlohmann's parser and writer, each once.
+#include "base/files/json.h"
 
 #include <algorithm>
 
