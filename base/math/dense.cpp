@@ -6,6 +6,8 @@
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <Eigen/SVD>
+#include <algorithm>
+#include <limits>
 
 namespace flexel {
 
@@ -50,7 +52,14 @@ Eigen::VectorXd solve_dense(const Eigen::MatrixXd& matrix, const Eigen::VectorXd
 }
 
 Eigen::VectorXd solve_least_norm(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right) {
-  return matrix.completeOrthogonalDecomposition().solve(right);
+  const SingularValues found = singular_values(matrix);
+  const double least = static_cast<double>(std::max(matrix.rows(), matrix.cols())) *
+                       std::numeric_limits<double>::epsilon() *
+                       (found.values.size() > 0 ? found.values[0] : 0);
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(matrix.cols());
+  for (Eigen::Index i = 0; i < found.values.size() && found.values[i] > least; ++i)
+    x += found.u.col(i).dot(right) / found.values[i] * found.v.col(i);
+  return x;
 }
 
 Eigen::Vector3d solve_symmetric_3(const Eigen::Matrix3d& matrix, const Eigen::Vector3d& right) {

@@ -39,7 +39,7 @@ struct NearestRotation {
 // matrix x = right, by Gaussian elimination with full pivoting.
 [[nodiscard]] Eigen::VectorXd solve_dense(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right);
 
-// Of all x that come nearest to matrix x = right the shortest, by a complete orthogonal decomposition.
+// Of all x that come nearest to matrix x = right the shortest, by singular values.
 [[nodiscard]] Eigen::VectorXd solve_least_norm(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right);
 
 // matrix x = right of a symmetric positive semidefinite matrix, by L D L^T with pivoting.
