@@ -3,47 +3,26 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
-#include <thread>
+#include <string>
 #include <vector>
+
+#include "tests/base/heard.h"
 
 namespace flexel {
 namespace {
 
-class Heard : public ProgressListener {
- public:
-  Heard() { set_progress_listener(this); }
-  ~Heard() override { set_progress_listener(nullptr); }
-  Heard(const Heard&) = delete;
-  Heard& operator=(const Heard&) = delete;
-  void update(const std::string& stage, double share, const std::string& note,
-              std::optional<double> left) noexcept override {
-    stages.push_back(stage);
-    shares.push_back(share);
-    notes.push_back(note);
-    had_left = had_left || left.has_value();
-  }
-  void say(const std::string& line) noexcept override { lines.push_back(line); }
-  void warn(const std::string& line) noexcept override { lines.push_back(line); }
-  std::vector<std::string> stages, notes, lines;
-  std::vector<double> shares;
-  bool had_left = false;
-};
-
-void wait() {
-  std::this_thread::sleep_for(std::chrono::milliseconds(110));  // updates sooner than that are not shown
-}
+using test::Heard, test::wait_for_update;
 
 TEST(Progress, ARunWithinARunMovesItsStretchOfTheStage) {
   Heard heard;
   Progress whole("flexel", Progress::Mode::lines);
   whole.stage("bars");
-  wait();
+  wait_for_update();
   ProgressStretch first(whole, 0.25, 0.75);
   Progress& stretch = first.inner();
   stretch.stage("simulate");
   stretch.update(0.5, "newton 3");
-  wait();
+  wait_for_update();
   {
     ProgressStretch deeper(stretch, 0.5, 1);
     deeper.inner().update(0.5);

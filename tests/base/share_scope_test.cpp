@@ -3,78 +3,58 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <thread>
 #include <vector>
 
 #include "base/parallel.h"
 #include "base/program/progress.h"
 #include "base/program/progress_stretch.h"
+#include "tests/base/heard.h"
 
 namespace flexel {
 namespace {
 
-class HeardShares : public ProgressListener {
- public:
-  HeardShares() { set_progress_listener(this); }
-  ~HeardShares() override { set_progress_listener(nullptr); }
-  HeardShares(const HeardShares&) = delete;
-  HeardShares& operator=(const HeardShares&) = delete;
-  void update(const std::string&, double share, const std::string& note,
-              std::optional<double>) noexcept override {
-    shares.push_back(share);
-    notes.push_back(note);
-  }
-  void say(const std::string&) noexcept override {}
-  void warn(const std::string&) noexcept override {}
-  std::vector<double> shares;
-  std::vector<std::string> notes;
-};
-
-// Updates sooner than that are not shown.
-void pause() {
-  std::this_thread::sleep_for(std::chrono::milliseconds(110));
-}
+using test::Heard, test::wait_for_update;
 
 TEST(ShareScope, MovesItsStretchOfTheStageAndPartsMoveTheirsOfIt) {
-  HeardShares heard;
+  Heard heard;
   Progress progress("flexel", Progress::Mode::lines);
   progress.stage("heal");
-  pause();
+  wait_for_update();
   const ShareScope part(progress, 0.5, 1, "lid");
-  pause();
+  wait_for_update();
   tell_share(0.5);
-  pause();
+  wait_for_update();
   {
     const ShareScope first(0.5, 1);
     tell_share(0.5);
-    pause();
+    wait_for_update();
     const ShareScope own(progress, 0, 0.5, "walls");  // of the same Progress: within
-    pause();
+    wait_for_update();
     tell_share(7);  // no more than all of it
   }
-  pause();
+  wait_for_update();
   tell_share(1);
   EXPECT_EQ(heard.shares, (std::vector<double>{0, 0.5, 0.75, 0.875, 0.75, 0.875, 1}));
   EXPECT_EQ(heard.notes, (std::vector<std::string>{"", "lid", "lid", "lid", "walls", "walls", "lid"}));
 }
 
 TEST(ShareScope, OfARunWithinARunTellsThatRun) {
-  HeardShares heard;
+  Heard heard;
   Progress progress("flexel", Progress::Mode::lines);
   progress.stage("look");
-  pause();
+  wait_for_update();
   const ShareScope whole(progress, 0, 1);
-  pause();
+  wait_for_update();
   ProgressStretch run(progress, 0.2, 0.6);
   const ShareScope scope(run.inner(), 0, 1);
-  pause();
+  wait_for_update();
   tell_share(0.5);
   EXPECT_EQ(heard.shares, (std::vector<double>{0, 0, 0.2, 0.4}));
 }
 
 TEST(ShareScope, NobodyHearsWhatIsToldOutsideOrOnAnotherThread) {
-  HeardShares heard;
+  Heard heard;
   Progress progress("flexel", Progress::Mode::lines);
   tell_share(0.5);
   const ShareScope nobodys(0, 1);
