@@ -30,6 +30,7 @@ namespace {
 
 constexpr double kRigidShare = 0.1;   // of the tolerance
 constexpr double kCurveShare = 0.25;  // of the tolerance, for curves
+constexpr double kPoleShare = 1e-4;   // likewise, for curves that end in a pole
 constexpr double kLeastTolerance = 1e-7;
 constexpr double kAngle = 1.05;     // rad: no span of a turned surface is longer
 constexpr double kLongestSpan = 3;  // lattice spacings
@@ -117,6 +118,19 @@ struct DeformedGeometry::OnFace {
   [[nodiscard]] gp_XYZ at(double share) const {
     const gp_Pnt2d uv = curve->Value(begin + share * (end - begin));
     return surface.Value(uv.X(), uv.Y()).XYZ();
+  }
+  // Whether one end is where the surface has no extent along one of its parameters.
+  [[nodiscard]] bool ends_in_pole() const {
+    constexpr double kNone = 1e-6;  // of the extent along the other
+    for (const double t : {begin, end}) {
+      const gp_Pnt2d uv = curve->Value(t);
+      gp_Pnt point;
+      gp_Vec by_u, by_v;
+      surface.D1(uv.X(), uv.Y(), point, by_u, by_v);
+      const double u = by_u.Magnitude(), v = by_v.Magnitude();
+      if (std::min(u, v) < kNone * std::max(u, v)) return true;
+    }
+    return false;
   }
 };
 
@@ -234,6 +248,9 @@ std::vector<DeformedGeometry::OnFace> DeformedGeometry::on_faces(const TopoDS_Sh
   return found;
 }
 
+// Beside a pole parameters turn about, and however narrow the gap of a curve that ends in it is, it is wider than the
+// surface around the pole: meshers (gmsh), which go down to a nanometre there, find faces that pass each other. Such a
+// curve lies on the pole's surface alone.
 void DeformedGeometry::fit_edge(std::size_t i) {
   DeformedEdge& result = edge_[i];
   const TopoDS_Edge edge =
@@ -272,14 +289,18 @@ void DeformedGeometry::fit_edge(std::size_t i) {
       breaks_of([&](GeomAbs_Shape order) { return adaptor.NbIntervals(order); },
                 [&](TColStd_Array1OfReal& ends, GeomAbs_Shape order) { adaptor.Intervals(ends, order); }),
       least_spans(length_of(curve, begin, end), turns ? end - begin : 0, options_.spacing));
+  const auto at_pole =
+      std::find_if(faces.begin(), faces.end(), [](const OnFace& face) { return face.ends_in_pole(); });
   const auto mean = [&](double t) {
     if (faces.empty()) return map(curve->Value(t).XYZ());
+    if (at_pole != faces.end()) return at_pole->at((t - begin) / (end - begin));
     gp_XYZ sum(0, 0, 0);
     for (const OnFace& face : faces) sum += face.at((t - begin) / (end - begin));
     return sum / static_cast<double>(faces.size());
   };
   const bool closed = moved.from.front().IsEqual(moved.from.back(), kLeastTolerance);
-  result.curve = fit_curve(mean, knots, closed, kCurveShare * options_.tolerance).curve;
+  const double share = at_pole != faces.end() ? kPoleShare : kCurveShare;
+  result.curve = fit_curve(mean, knots, closed, share * options_.tolerance).curve;
   if (result.curve.IsNull()) throw InputError("an edge cannot be deformed: no curve goes through its points");
 }
 

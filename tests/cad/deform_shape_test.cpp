@@ -21,6 +21,7 @@
 #include <TopoDS.hxx>
 #include <TopoDS_Edge.hxx>
 #include <TopoDS_Face.hxx>
+#include <TopoDS_Vertex.hxx>
 #include <cmath>
 
 #include "tests/cad/shape_volume.h"
@@ -179,6 +180,45 @@ TEST(DeformShape, AVertexAtAPoleIsThePole) {
     }
   }
   EXPECT_EQ(poles, 1);
+}
+
+// What is around a pole is smaller than any tolerance: a curve that ends there is the nearer to the pole's surface, the nearer
+// it is to the pole. A quarter of a cone has its tip in a corner of three faces.
+TEST(DeformShape, ACurveIntoAPoleLiesOnItsSurface) {
+  const TopoDS_Shape cone = BRepPrimAPI_MakeCone(15, 0, 40, M_PI / 2).Shape();
+  const auto wave = [](const gp_XYZ& p) {
+    return gp_XYZ(p.X() + 2 * std::sin(0.2 * p.Z()), p.Y() + std::sin(0.3 * p.X() + 0.2 * p.Z()), p.Z());
+  };
+  const DeformedGeometry geometry(cone, same_everywhere(wave), {0.05, 40});  // fits that differ
+  const TopoDS_Shape deformed = deform_shape(cone, geometry).shape;
+  EXPECT_TRUE(BRepCheck_Analyzer(deformed).IsValid());
+  int curves = 0;
+  for (TopExp_Explorer each(deformed, TopAbs_FACE); each.More(); each.Next()) {
+    const TopoDS_Face& face = TopoDS::Face(each.Current());
+    TopoDS_Vertex pole;
+    for (TopExp_Explorer part(face, TopAbs_EDGE); part.More(); part.Next())
+      if (BRep_Tool::Degenerated(TopoDS::Edge(part.Current())))
+        pole = TopExp::FirstVertex(TopoDS::Edge(part.Current()));
+    if (pole.IsNull()) continue;
+    for (TopExp_Explorer part(face, TopAbs_EDGE); part.More(); part.Next()) {
+      const TopoDS_Edge& edge = TopoDS::Edge(part.Current());
+      const bool first = TopExp::FirstVertex(edge).IsSame(pole);
+      if (BRep_Tool::Degenerated(edge) || (!first && !TopExp::LastVertex(edge).IsSame(pole))) continue;
+      ++curves;
+      double begin = 0, end = 0;
+      const Handle(Geom_Curve) curve = BRep_Tool::Curve(edge, begin, end);
+      const Handle(Geom2d_Curve) on_face = BRep_Tool::CurveOnSurface(edge, face, begin, end);
+      for (const double share : {1e-1, 1e-3, 1e-5}) {
+        const double t = first ? begin + share * (end - begin) : end - share * (end - begin);
+        const gp_Pnt along = curve->Value(t);
+        const gp_Pnt2d uv = on_face->Value(t);
+        EXPECT_LT(along.Distance(BRep_Tool::Surface(face)->Value(uv.X(), uv.Y())),
+                  1e-4 * along.Distance(BRep_Tool::Pnt(pole)))
+            << share;
+      }
+    }
+  }
+  EXPECT_EQ(curves, 2);
 }
 
 // OpenCASCADE meshes each face with the points of its edges: a face that it cannot mesh is left out without a word.
