@@ -32,8 +32,9 @@ constexpr double kRigidShare = 0.1;   // of the tolerance
 constexpr double kCurveShare = 0.25;  // of the tolerance, for curves
 constexpr double kPoleShare = 1e-4;   // likewise, for curves that end in a pole
 constexpr double kLeastTolerance = 1e-7;
-constexpr double kAngle = 1.05;     // rad: no span of a turned surface is longer
-constexpr double kLongestSpan = 3;  // lattice spacings
+constexpr double kAngle = 1.05;        // rad: no span of a turned surface is longer
+constexpr double kLongestSpan = 3;     // lattice spacings
+constexpr double kShortestSpan = 0.1;  // tolerances: a break so near to another may be a little beside it
 constexpr std::size_t kMostFirstSpans = 200;
 constexpr double kStep = 1e-3;  // lattice spacings, of differences
 constexpr double kLooks = 2;    // a lattice spacing: what moves a single cell is seen
@@ -62,6 +63,16 @@ std::size_t least_spans(double length, double angle, double spacing) {
   const double by_length = spacing > 0 ? length / (kLongestSpan * spacing) : 0, by_angle = angle / kAngle;
   return static_cast<std::size_t>(
       std::clamp(std::ceil(std::max(by_length, by_angle)), 2.0, static_cast<double>(kMostFirstSpans)));
+}
+
+// For what is `length` long from parameter `begin` to `end`; `turns`: the parameter is an angle.
+template <class Count, class Intervals>
+Knots first_knots(double begin, double end, double length, bool turns, const FitOptions& options,
+                  const Count& count, const Intervals& intervals) {
+  const double width = end - begin,
+               shortest = length > 0 ? kShortestSpan * options.tolerance / length * width : 0;
+  return make_knots(begin, end, breaks_of(count, intervals),
+                    least_spans(length, turns ? width : 0, options.spacing), shortest);
 }
 
 bool turns_in_u(GeomAbs_SurfaceType type) {
@@ -199,16 +210,14 @@ void DeformedGeometry::fit_face(std::size_t i) {
   }
   const GeomAdaptor_Surface adaptor(surface, d.u_begin, d.u_end, d.v_begin, d.v_end);
   const GeomAbs_SurfaceType type = adaptor.GetType();
-  const Knots u = make_knots(
-      d.u_begin, d.u_end,
-      breaks_of([&](GeomAbs_Shape order) { return adaptor.NbUIntervals(order); },
-                [&](TColStd_Array1OfReal& ends, GeomAbs_Shape order) { adaptor.UIntervals(ends, order); }),
-      least_spans(result.u_length, turns_in_u(type) ? d.u_end - d.u_begin : 0, options_.spacing));
-  const Knots v = make_knots(
-      d.v_begin, d.v_end,
-      breaks_of([&](GeomAbs_Shape order) { return adaptor.NbVIntervals(order); },
-                [&](TColStd_Array1OfReal& ends, GeomAbs_Shape order) { adaptor.VIntervals(ends, order); }),
-      least_spans(result.v_length, turns_in_v(type) ? d.v_end - d.v_begin : 0, options_.spacing));
+  const Knots u = first_knots(
+      d.u_begin, d.u_end, result.u_length, turns_in_u(type), options_,
+      [&](GeomAbs_Shape order) { return adaptor.NbUIntervals(order); },
+      [&](TColStd_Array1OfReal& ends, GeomAbs_Shape order) { adaptor.UIntervals(ends, order); });
+  const Knots v = first_knots(
+      d.v_begin, d.v_end, result.v_length, turns_in_v(type), options_,
+      [&](GeomAbs_Shape order) { return adaptor.NbVIntervals(order); },
+      [&](TColStd_Array1OfReal& ends, GeomAbs_Shape order) { adaptor.VIntervals(ends, order); });
   const FaceMask mask(face, d);
   SurfaceMap fitted;
   fitted.point = [&](double at_u, double at_v) { return map(adaptor.Value(at_u, at_v).XYZ()); };
@@ -284,11 +293,10 @@ void DeformedGeometry::fit_edge(std::size_t i) {
   }
   const GeomAdaptor_Curve adaptor(curve, begin, end);
   const bool turns = adaptor.GetType() == GeomAbs_Circle || adaptor.GetType() == GeomAbs_Ellipse;
-  const Knots knots = make_knots(
-      begin, end,
-      breaks_of([&](GeomAbs_Shape order) { return adaptor.NbIntervals(order); },
-                [&](TColStd_Array1OfReal& ends, GeomAbs_Shape order) { adaptor.Intervals(ends, order); }),
-      least_spans(length_of(curve, begin, end), turns ? end - begin : 0, options_.spacing));
+  const Knots knots = first_knots(
+      begin, end, length_of(curve, begin, end), turns, options_,
+      [&](GeomAbs_Shape order) { return adaptor.NbIntervals(order); },
+      [&](TColStd_Array1OfReal& ends, GeomAbs_Shape order) { adaptor.Intervals(ends, order); });
   const auto at_pole =
       std::find_if(faces.begin(), faces.end(), [](const OnFace& face) { return face.ends_in_pole(); });
   const auto mean = [&](double t) {

@@ -26,8 +26,9 @@ std::vector<double> Knots::greville() const {
   return result;
 }
 
-Knots make_knots(double begin, double end, std::vector<Break> breaks, std::size_t least_spans) {
-  const double least = 1e-9 * std::max(1.0, end - begin);
+Knots make_knots(double begin, double end, std::vector<Break> breaks, std::size_t least_spans,
+                 double shortest) {
+  const double least = std::max(shortest, 1e-9 * std::max(1.0, end - begin));
   std::erase_if(breaks,
                 [&](const Break& each) { return each.at <= begin + least || each.at >= end - least; });
   std::sort(breaks.begin(), breaks.end(), [](const Break& a, const Break& b) { return a.at < b.at; });

@@ -25,8 +25,11 @@ struct Break {
   int continuity = 0;
 };
 
-// From `begin` to `end`, with a knot at every break and no span longer than a `least_spans`-th of the whole.
-[[nodiscard]] Knots make_knots(double begin, double end, std::vector<Break> breaks, std::size_t least_spans);
+// From `begin` to `end`, with a knot at every break and no span longer than a `least_spans`-th of the whole. Breaks nearer
+// than `shortest` to an end have none, and those nearer to one another share one: derivatives of a span that short are
+// rounding, and a curve along a surface's rim beside a pole runs through nothing else.
+[[nodiscard]] Knots make_knots(double begin, double end, std::vector<Break> breaks, std::size_t least_spans,
+                               double shortest = 0);
 
 // Splits the spans whose error is above `tolerance`, each into as many (4 at most) as its error asks for, which goes
 // with the power kDegree + 1 of its length. False, and nothing changes: none can be split, or there would be more than

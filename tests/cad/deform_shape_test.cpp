@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <BRepAlgoAPI_Cut.hxx>
+#include <BRepBuilderAPI_MakeFace.hxx>
 #include <BRepCheck_Analyzer.hxx>
 #include <BRepMesh_IncrementalMesh.hxx>
 #include <BRepPrimAPI_MakeBox.hxx>
@@ -13,9 +14,13 @@
 #include <BRepPrimAPI_MakeTorus.hxx>
 #include <BRep_Builder.hxx>
 #include <BRep_Tool.hxx>
+#include <Geom_BSplineSurface.hxx>
 #include <Geom_CylindricalSurface.hxx>
 #include <Geom_Plane.hxx>
 #include <Poly_Triangulation.hxx>
+#include <TColStd_Array1OfInteger.hxx>
+#include <TColStd_Array1OfReal.hxx>
+#include <TColgp_Array2OfPnt.hxx>
 #include <TopExp.hxx>
 #include <TopExp_Explorer.hxx>
 #include <TopoDS.hxx>
@@ -219,6 +224,33 @@ TEST(DeformShape, ACurveIntoAPoleLiesOnItsSurface) {
     }
   }
   EXPECT_EQ(curves, 2);
+}
+
+// Pcurves of other programs pass the last knot of their surface by a little: in a span that short, second derivatives are
+// the rounding of a file's digits, and a rim beside a pole has a curvature of any size.
+TEST(DeformShape, AFaceThatPassesAKnotByALittleHasNoShortSpan) {
+  constexpr double kPast = 3e-5, kLoose = 0.05;  // of the surface's lengths, which are some 25 a unit
+  TColgp_Array2OfPnt poles(1, 2, 1, 6);
+  for (int i = 1; i <= 2; ++i)
+    for (int j = 1; j <= 6; ++j) poles(i, j) = gp_Pnt(20 * i, 10 * j, j % 2);
+  TColStd_Array1OfReal u_knots(1, 2), v_knots(1, 3);
+  TColStd_Array1OfInteger u_times(1, 2), v_times(1, 3);
+  u_knots(1) = v_knots(1) = 0, u_knots(2) = v_knots(2) = 1, v_knots(3) = 2;
+  u_times(1) = u_times(2) = v_times(2) = 2, v_times(1) = v_times(3) = 4;
+  const Handle(Geom_BSplineSurface) surface =
+      new Geom_BSplineSurface(poles, u_knots, v_knots, u_times, v_times, 1, 3);
+  const TopoDS_Face face = BRepBuilderAPI_MakeFace(surface, 0, 1, 0, 1 + kPast, 1e-9);
+  const DeformedGeometry geometry(face, same_everywhere(twist), {kLoose, 5});
+  EXPECT_TRUE(geometry.face(0).reached);
+  const auto fitted = Handle(Geom_BSplineSurface)::DownCast(geometry.face(0).surface);
+  ASSERT_FALSE(fitted.IsNull());
+  EXPECT_NEAR(fitted->VKnot(fitted->NbVKnots()), 1 + kPast, 1e-12);
+  for (int i = 2; i <= fitted->NbVKnots(); ++i)
+    EXPECT_GT(fitted->VKnot(i) - fitted->VKnot(i - 1), 10 * kPast) << i;
+  for (double v = 0; v <= 1; v += 0.03125) {
+    const gp_XYZ to = twist(surface->Value(0.3, v).XYZ());
+    EXPECT_LT((fitted->Value(0.3, v).XYZ() - to).Modulus(), 1.2 * kLoose) << v;
+  }
 }
 
 // OpenCASCADE meshes each face with the points of its edges: a face that it cannot mesh is left out without a word.

@@ -44,6 +44,13 @@ TEST(Knots, HaveEveryBreakAndNoLongSpan) {
     EXPECT_GT(knots.greville()[i], knots.greville()[i - 1]);
 }
 
+TEST(Knots, NoBreakMakesASpanThatIsTooShort) {
+  const Knots knots = make_knots(0, 10, {{0.01, 1}, {4, 3}, {4.01, 0}, {7, 1}, {9.99, 0}}, 1, 0.02);
+  EXPECT_EQ(knots.at, std::vector<double>({0, 4, 7, 10}));
+  EXPECT_EQ(knots.multiplicity, std::vector<int>({kDegree + 1, kDegree, kDegree - 1, kDegree + 1}));
+  EXPECT_EQ(make_knots(0, 10, {{0.01, 1}, {4, 3}, {4.01, 0}, {7, 1}, {9.99, 0}}, 1, 0.001).spans(), 6u);
+}
+
 TEST(Knots, OnlyBadSpansAreSplit) {
   Knots knots = make_knots(0, 4, {}, 4);
   const Knots before = knots;
