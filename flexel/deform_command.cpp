@@ -726,8 +726,8 @@ std::optional<FlexAnswer> flex_answer(const SolvedRun& run, const Plan& plan,
 
 std::string summary_text(const SolvedRun& run, const mapping::MapReport& mapped, const Plan& plan,
                          const std::optional<AccuracyReport>& accuracy,
-                         const std::optional<FlexAnswer>& flexed,
-                         const std::vector<mapping::CadAnswer>& cad) {
+                         const std::optional<FlexAnswer>& flexed, const std::vector<mapping::CadAnswer>& cad,
+                         const KeptWarnings& warnings) {
   nlohmann::ordered_json summary;
   summary["voxelize"] = parse_json(voxelize::summary_json(run.voxels));
   summary["simulate"] = parse_json(simulate::summary_json(run.simulated, run.voxels.body));
@@ -738,6 +738,7 @@ std::string summary_text(const SolvedRun& run, const mapping::MapReport& mapped,
     if (flexed->volume_change) summary["flex"]["volume_change"] = *flexed->volume_change;
   }
   for (const mapping::CadAnswer& each : cad) summary["cad"].push_back(parse_json(each.json));
+  summary["warnings"] = warnings.lines();
   return json_text(summary, 2) + "\n";
 }
 
@@ -785,7 +786,7 @@ void say_dropped_model(const AccuracyReport& accuracy, Progress& progress) {
 }
 
 Deformed run_stages(const DeformArguments& arguments, Plan& plan, Progress& progress) {
-  const KeptWarnings warnings;  // for the pages
+  const KeptWarnings warnings;  // for the summary and the pages
   Deformed result;
   auto& [run, mapped, accuracy, lines, summary, cad] = result;
   {
@@ -829,7 +830,7 @@ Deformed run_stages(const DeformArguments& arguments, Plan& plan, Progress& prog
     progress.finish();
   }
   const std::optional<FlexAnswer> flexed = flex_answer(run, plan, mapped, progress);
-  summary = summary_text(run, found, plan, accuracy, flexed, cad);
+  summary = summary_text(run, found, plan, accuracy, flexed, cad, warnings);
   if (!arguments.summary.empty()) write_text(summary, arguments.summary);
   // With --verbose simulate() has said what infill is.
   lines = last_lines(run, plan, accuracy, accuracy || !arguments.verbose, cad);

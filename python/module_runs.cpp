@@ -4,6 +4,7 @@
 #include "base/files/outputs.h"
 #include "base/parallel.h"
 #include "base/program/arguments.h"
+#include "base/program/brief_output.h"
 #include "flexel/commands.h"
 #include "flexel/deform.h"
 #include "flexel/job.h"
@@ -159,8 +160,9 @@ py::tuple simulate_body(const BodyObject& body, const std::vector<std::string>& 
     CommandLine app{"A scene.", "flexel simulate"};
     const simulate::Scene scene = scene_of(app, words, scene_text, scene_name, moved);
     Progress progress("flexel");
+    const KeptWarnings warnings;
     const simulate::SimulateResult result = simulate::simulate(moved, scene, options, progress);
-    run->summary = summary_json(result, moved);
+    run->summary = summary_json(result, moved, warnings.lines());
     run->answer = answer_lines(result, moved, known_materials(scene, moved));
     progress.finish();
     run->body = body_object(std::move(moved));

@@ -6,6 +6,7 @@
 #include "base/files/output_file.h"
 #include "base/files/outputs.h"
 #include "base/program/arguments.h"
+#include "base/program/brief_output.h"
 #include "base/program/program.h"
 #include "base/program/termination.h"
 #include "formats/exchange/body_name.h"
@@ -219,18 +220,20 @@ int run(int argc, char** argv) {
   const bool series = extension(arguments.output) == "pvd";
   if (series) options.series = arguments.output;
   OutputsTogether outputs({series ? "" : arguments.output, options.history, arguments.summary});
+  const KeptWarnings warnings;  // for the summary
   const SimulateResult result = simulate::simulate(body, scene, options, progress);
+  const auto summary = [&] { return summary_json(result, body, warnings.lines()); };
   if (arguments.verbose || options.explain)
     for (const std::string& line : summary_lines(result)) progress.say(line);
   progress.stage("write");
   BodyFileOptions file_options;
   file_options.compress = arguments.compress;
   if (!series) write_body(body, arguments.output, file_options);
-  if (!arguments.summary.empty()) write_text(summary_json(result, body), arguments.summary);
+  if (!arguments.summary.empty()) write_text(summary(), arguments.summary);
   outputs.appear();
   progress.finish();
   for (const std::string& line : answer_lines(result, body, known_materials(scene, body))) progress.say(line);
-  if (arguments.json) write_text(summary_json(result, body), "-");
+  if (arguments.json) write_text(summary(), "-");
   return kExitDone;
 }
 

@@ -294,9 +294,20 @@ std::string run_line(const SimulateResult& result) {
       result.seconds);
 }
 
+// What was told has the scene's name before it.
+std::vector<std::string> all_warnings(const SimulateResult& result, const std::vector<std::string>& told) {
+  std::vector<std::string> all = told;
+  for (const std::string& warning : warnings_of(result))
+    if (std::none_of(told.begin(), told.end(),
+                     [&](const std::string& line) { return line.ends_with(warning); }))
+      all.push_back(warning);
+  return all;
+}
+
 }  // namespace
 
-std::string summary_json(const SimulateResult& result, const Body& body) {
+std::string summary_json(const SimulateResult& result, const Body& body,
+                         const std::vector<std::string>& told) {
   Json json;
   json["program"] = "flexel-simulate";
   json["version"] = version();
@@ -310,7 +321,7 @@ std::string summary_json(const SimulateResult& result, const Body& body) {
   json["mass"] = result.mass;
   json["largest_displacement"] = result.largest_displacement;
   json["largest_displacement_at"] = vector(result.largest_displacement_at);
-  json["warnings"] = warnings_of(result);
+  json["warnings"] = all_warnings(result, told);
   json["probes"] = Json::array();
   for (const ProbeResult& probe : result.probes)
     json["probes"].push_back(

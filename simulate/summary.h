@@ -8,8 +8,10 @@
 
 namespace flexel::simulate {
 
-// The result as JSON (docs/reference/summary.md gives every key and unit).
-[[nodiscard]] std::string summary_json(const SimulateResult& result, const Body& body);
+// The result as JSON (docs/reference/summary.md gives every key and unit). `told`: the warnings of the run that were printed;
+// they are in it, and those that the result alone gives.
+[[nodiscard]] std::string summary_json(const SimulateResult& result, const Body& body,
+                                       const std::vector<std::string>& told = {});
 
 // The result in lines for people.
 [[nodiscard]] std::vector<std::string> summary_lines(const SimulateResult& result);

@@ -186,6 +186,7 @@ void TimedRun::resume(const Checkpoint& from) {
   next_row_ = from.next_row;
   next_frame_ = from.next_frame;
   frames_ = from.frames.times.size();
+  warn_of_unsure_fits();
 }
 
 // Within an implicit step: what was reached before it stays.

@@ -18,7 +18,7 @@ def test_deform_prints_its_summary():
     printed = parsed("deform", "box.stl", *PULL, "--json")
     expect_ok(run("flexel", "deform", "box.stl", *PULL, "-o", "bent.stl", "--summary", "summary.json"))
     written = json.loads(pathlib.Path("summary.json").read_text())
-    expect(list(printed) == ["voxelize", "simulate", "map"], f"{list(printed)}")
+    expect(list(printed) == ["voxelize", "simulate", "map", "warnings"], f"{list(printed)}")
     for key in ("largest_displacement", "mass", "reactions"):
         expect(printed["simulate"][key] == written["simulate"][key], f"{key}: {printed['simulate'][key]}")
     expect(printed["simulate"]["largest_displacement"] > 0, "nothing moved")
