@@ -158,7 +158,7 @@ def test_a_fit_that_facets_hide_is_told():
         expect(told(offset, radius) == [], f"{offset} {radius}")
 
 
-def test_a_fit_that_facets_hide_is_told_once():
+def test_a_fit_that_facets_hide_is_told_once_in_a_run():
     need_step()
     need("gmsh")
     write("fitted.geo", BOLTED.split("Cylinder(4)")[0].replace("0, 0, 7, 4", "0, 0, 7, 3") + 'Cylinder(4) = {.02, 0, -6, 0, 0, 15, 3};\nSave "fitted.step";\n')
@@ -169,6 +169,15 @@ def test_a_fit_that_facets_hide_is_told_once():
     scene("fit.toml", 'material = "PLA"\n[contact]\noverlap = "part"\noverlap_time = "1 us"\n[run]\ntime = "2 us"\n[[event]]\nat = "1 us"\ndo = "add"\nbody = "far.vtu"\n' + HELD)
     said = expect_ok(run("flexel-simulate", "fit.toml", "fitted.vtu", "-o", "pressed.vtu", "--quiet")).err
     expect(said.count("fit each other") == 1, f"a part that comes leaves the fit as it was: {said}")
+    # In the summary as well, and from a checkpoint again.
+    scene("longer.toml", 'material = "PLA"\n[contact]\noverlap = "part"\noverlap_time = "1 us"\n[run]\ntime = "50 us"\n' + HELD)
+    first = expect_ok(run("flexel-simulate", "longer.toml", "fitted.vtu", "-o", "one.vtu", "--summary", "first.json", "--checkpoint", "run.checkpoint",
+                          "--checkpoint-every", "1 ms")).err
+    again = expect_ok(run("flexel-simulate", "--resume", "run.checkpoint", "-o", "again.vtu", "--summary", "again.json")).err
+    for name, said in (("first.json", first), ("again.json", again)):
+        warnings = json.loads(pathlib.Path(name).read_text())["warnings"]
+        told = [line for line in warnings if "fit each other" in line]
+        expect(len(told) == 1 and said.count(told[0]) == 1, f"{name}: {warnings}, {said}")
 
 
 def test_names_of_assemblies_stand_for_their_parts():

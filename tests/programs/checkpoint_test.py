@@ -1,7 +1,5 @@
 """Timed runs that are stopped and go on: the same bytes as a run that was not, whatever the scene calls for; and refusals."""
 
-import json
-import math
 import os
 import pathlib
 import shutil
@@ -162,40 +160,6 @@ def test_written_now_and_then():
     os.remove("out.vtu")
     expect_ok(run("flexel-simulate", "--resume", "run.checkpoint"))
     expect(pathlib.Path("out.vtu").read_bytes() == whole_run, "the result should have the same bytes")
-
-
-def prism(name, outer, inner, low, high):
-    """An OBJ file of one part between two outlines, `inner` of a hole or nothing."""
-    count, loops = len(outer), [outer, inner] if inner else [outer]
-    vertices = [(x, y, z) for loop in loops for z in (low, high) for x, y in loop]
-    faces = []
-    for i, j in ((i, (i + 1) % count) for i in range(count)):
-        faces.append([i, j, count + j, count + i])
-        if inner:
-            faces += [[3 * count + i, 3 * count + j, 2 * count + j, 2 * count + i], [i, 2 * count + i, 2 * count + j, j],
-                      [count + i, count + j, 3 * count + j, 3 * count + i]]
-    if not inner:
-        faces += [list(range(count))[::-1], list(range(count, 2 * count))]
-    with open(name, "w") as file:
-        file.writelines(f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in vertices)
-        file.writelines("f " + " ".join(str(i + 1) for i in face) + "\n" for face in faces)
-
-
-def test_what_was_told_as_it_began_is_told_again():
-    """A pin in a hole whose facets hide how it fits, which a run says as it begins."""
-    ring = lambda radius, angle, x: [(x + radius * math.cos(angle + i * math.pi / 20), radius * math.sin(angle + i * math.pi / 20)) for i in range(40)]
-    prism("plate.obj", ring(5, 0, 0), ring(1.6, 0, 0), 0, 3)
-    prism("pin.obj", ring(1.6, .07, .012), None, -1.2, 4.1)
-    expect_ok(run("flexel-voxelize", "plate.obj", "pin.obj", "--unit", "mm", "--size", "1 mm", "-o", "body.vtu"))
-    scene(text='material = "steel"\n[run]\ntime = "20 us"\n[contact]\noverlap = "part"\noverlap_time = "10 us"\n')
-    first = expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu", "--summary", "first.json", "--checkpoint", "run.checkpoint",
-                          "--checkpoint-every", "10 ms"))
-    again = expect_ok(run("flexel-simulate", "--resume", "run.checkpoint", "-o", "again.vtu", "--summary", "again.json"))
-    for name, said in (("first.json", first.err), ("again.json", again.err)):
-        warnings = json.loads(pathlib.Path(name).read_text())["warnings"]
-        told = [line for line in warnings if '"plate" and "pin"' in line and "too little to be told from their facets" in line]
-        expect(len(told) == 1, f"{name}: {warnings}")
-        expect(said.count(told[0]) == 1, f"told once: {said}")
 
 
 def test_another_scene_or_body_is_refused():

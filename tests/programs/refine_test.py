@@ -668,6 +668,9 @@ def test_what_a_new_3mf_leaves_out_is_told():
     model = re.sub(r"<m:texture2dgroup.*?</m:texture2dgroup>", "", re.sub(r' pid="[34]" p1="\d+" p2="\d+" p3="\d+"', "", model))
     said = expect_ok(run("flexel-voxelize", threemf("plain.3mf", model), "--count", "500", "-o", "rest.vtu")).err
     expect("come out where" not in said, said)
+    mixed = model.replace("</resources>", '<m:multiproperties id="77" pids="4"><m:multi pindices="0"/></m:multiproperties></resources>')
+    said = expect_ok(run("flexel-voxelize", threemf("mixed.3mf", mixed), "--count", "500", "-o", "rest.vtu")).err
+    expect("mixed materials come out where" in said, said)
 
 
 if __name__ == "__main__":
