@@ -49,6 +49,7 @@ class ThreeMfReader {
         const std::string_view name = local_name(resource.name());
         if (name == "basematerials") colors[id] = threemf_colors(resource, "base", "displaycolor");
         textured_ = textured_ || name == "texture2dgroup";
+        mixed_ = mixed_ || name == "compositematerials" || name == "multiproperties";
         if (name == "colorgroup") colors[id] = threemf_colors(resource, "color", "color");
       }
     }
@@ -80,14 +81,15 @@ class ThreeMfReader {
           "\"{}\"{} has slices beside its triangles, which are not read: a 3MF file that is written "
           "from it has none where the part moved",
           *sliced_.begin(), others(sliced_)));
-    if (textured_ || shaded_)
+    std::vector<const char*> kept;  // in the file's own form alone
+    if (textured_) kept.push_back("textures");
+    if (shaded_) kept.push_back("colours of corners");
+    if (mixed_) kept.push_back("mixed materials");
+    if (!kept.empty())
       warn(
           fmt::format("{}: {} come out where all of it is written again as one 3MF file; other formats, a "
                       "file for each part and one of several sources leave them out",
-                      content_.where(),
-                      textured_ && shaded_ ? "textures and colours of corners"
-                      : textured_          ? "textures"
-                                           : "colours of corners"));
+                      content_.where(), fmt::join(kept, " and ")));
   }
 
   void add_use(std::size_t u) {
@@ -169,6 +171,7 @@ class ThreeMfReader {
   Column color_{4, {}};
   bool colored_ = false;
   bool textured_ = false, shaded_ = false;  // shaded: corners of a triangle differ in colour
+  bool mixed_ = false;                      // of several properties or materials at once
   std::set<std::string> supports_;          // names of objects that hold the print up
   std::set<std::string> sliced_;            // and of those with slices
 };
