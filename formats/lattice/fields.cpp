@@ -9,6 +9,7 @@
 
 #include "base/parallel.h"
 #include "formats/lattice/cell_moments.h"
+#include "formats/lattice/fragments_of_body.h"
 #include "formats/lattice/quadratic_field.h"
 
 namespace flexel {
@@ -106,17 +107,25 @@ FirstLargest largest_between_corners(const Body& body, const SurfaceMotion& moti
   return largest;
 }
 
+// Whether the point lies past its cell.
+bool is_outside(const CellPoint& point) {
+  constexpr double kRounding = 1e-6;
+  return *std::min_element(point.weights.begin(), point.weights.end()) < -kRounding;
+}
+
 FirstLargest largest_of_surface(const Body& body, const std::vector<Vec3>& displacement) {
   constexpr double kMore = 1e-9;  // than rounding
   const SurfaceMotion motion(body, displacement);
   const std::vector<std::uint32_t> around = polygons_around_vertices(body);
+  const bool carved = body.notes.contains(kCarvedNote);  // a polygon may reach past the matter that is left
   FirstLargest largest = parallel_sum<FirstLargest>(around.size(), [&](std::size_t v) {
     if (around[v] == kNoPolygonAround) return FirstLargest{};
     const Vec3& vertex = body.surface.vertices[v];
-    const std::optional<Vec3> found = motion(around[v], vertex);
-    return found ? moved(*found, vertex, around[v]) : FirstLargest{};
+    const std::optional<CellPoint> cell = locate_on_surface(body, around[v], vertex);
+    if (!cell || (carved && is_outside(*cell))) return FirstLargest{};
+    return moved(motion(around[v], *cell, vertex), vertex, around[v]);
   });
-  if (largest.squared < 0) return largest;
+  if (largest.squared < 0 && !carved) return largest;
   const Triangles triangles = triangulate(body.surface);
   const FirstLargest between = parallel_sum<FirstLargest>(triangles.corners.size(), [&](std::size_t t) {
     const std::uint32_t polygon = triangles.polygon[t];

@@ -79,6 +79,20 @@ TEST(EventsAtRest, CarvingIsThatOfARunInTime) {
   EXPECT_LT((rest.position.back() - rest.rest.back()).z(), 1.5 * end_of(resting_bar(), "").z()) << "weaker";
 }
 
+// What is told of the largest displacement is of the matter that is left, though the surface goes on.
+TEST(EventsAtRest, WhatIsCarvedAwayHasNoDisplacement) {
+  const std::string pulled = "[[fix]]\nwhere = \"x0\"\n[gravity]\nacceleration = [\"10 m/s2\", 0, 0]\n";
+  Body body = resting_bar();
+  const SimulateResult result = simulate_quietly(
+      body, rest_scene(pulled + "[[event]]\ndo = \"carve\"\nwhere = { half_space = { point = [\"20 mm\", 0, "
+                                "0], normal = [1, 0, 0] } }\n"));
+  double largest = 0;
+  for (std::size_t e = 0; e < body.element_count(); ++e)
+    largest = std::max(largest, (body.position[e] - body.rest[e]).norm());
+  EXPECT_LT(result.largest_displacement_at.x(), 2 * kBarCell + 1e-9);
+  EXPECT_NEAR(result.largest_displacement / largest, 1, 1e-12);
+}
+
 // Two bars half a millimetre apart are one, and stay so in the body.
 TEST(EventsAtRest, FusedPartsCarryEachOther) {
   const flexel::test::Scratch scratch;
