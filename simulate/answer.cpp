@@ -245,14 +245,29 @@ std::string strength(const SimulateResult& result, const Body& body, const std::
   return text;
 }
 
+// N, on the body of `size`, m: what planes bear is no reaction, but at rest all that loads and reactions lack. Zero:
+// no more than the tolerance leaves over.
+Vec3 borne_by_planes(const SimulateResult& result, double size) {
+  if (!result.settled) return Vec3::Zero();
+  double scale = 0;
+  for (const AppliedLoad& load : result.loads) scale += load.force.norm() + load.moment.norm() / size;
+  for (const Reaction& reaction : result.reactions)
+    scale += reaction.force.norm() + reaction.moment.norm() / size;
+  if (!(result.imbalance.norm() > 10 * result.settled->tolerance * scale)) return Vec3::Zero();
+  return -result.imbalance;
+}
+
 std::string held_by(const SimulateResult& result, const Body& body) {
-  if (result.reactions.empty()) return "nothing";
   const double size = bounding_box(body.rest).diagonal();
+  const Vec3 planes = borne_by_planes(result, size);
+  const std::string by_planes = planes.isZero(0) ? "" : "planes with " + directed(planes);
+  if (result.reactions.empty()) return by_planes.empty() ? "nothing" : by_planes;
   std::string text;
   for (std::size_t r = 0; r < std::min(kNamed, result.reactions.size()); ++r)
     text += fmt::format("{}\"{}\" with {}", text.empty() ? "" : ", ", result.reactions[r].name,
                         borne(result.reactions[r], size));
-  return text + more(result.reactions.size());
+  text += more(result.reactions.size());
+  return by_planes.empty() ? text : text + ", " + by_planes;
 }
 
 // Three digits, as an option takes them.

@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <sstream>
 
 #include "base/parallel.h"
 #include "formats/lattice/cell_moments.h"
+#include "formats/lattice/fragments_of_body.h"
 #include "formats/lattice/quadratic_field.h"
 
 namespace flexel {
@@ -106,17 +108,55 @@ FirstLargest largest_between_corners(const Body& body, const SurfaceMotion& moti
   return largest;
 }
 
+// The voxels that carving took: part, i, j, k; ascending.
+using CarvedVoxels = std::vector<std::array<std::int64_t, 4>>;
+
+CarvedVoxels carved_voxels(const Body& body) {
+  CarvedVoxels voxels;
+  const auto note = body.notes.find(kCarvedNote);
+  if (note == body.notes.end()) return voxels;
+  std::istringstream text(note->second);
+  for (std::array<std::int64_t, 4> at; text >> at[0] >> at[1] >> at[2] >> at[3];) voxels.push_back(at);
+  std::sort(voxels.begin(), voxels.end());
+  return voxels;
+}
+
+// Whether the matter at a point of the surface is left, which its polygon may reach past: no voxel that carving took
+// lies between it and the polygon's nearest cell. Others that are no cells hold slivers of matter, too little for one.
+bool is_left(const Body& body, const CarvedVoxels& carved, std::uint32_t polygon, std::uint32_t cell,
+             const Vec3& point) {
+  constexpr double kRounding = 1e-6;  // of a cell
+  if (carved.empty()) return true;
+  const std::uint32_t part = body.surface.polygon_part(polygon);
+  const Index3& corner = body.lattice_index[body.cell_elements[cell][0]];
+  const Vec3 to = cell_coordinates(body, body.parts[part], cell, point),
+             from = to.cwiseMax(0.0).cwiseMin(1.0);
+  const double steps = std::ceil(2 * (to - from).cwiseAbs().maxCoeff());
+  for (double step = 1; step <= steps; ++step) {
+    const Vec3 at = from + step / steps * (to - from);
+    const Vec3 away = (at.array() - 1 - kRounding).ceil().max(0) + (at.array() + kRounding).floor().min(0);
+    if (away.isZero(0)) continue;  // the cell's own voxel may have lost another piece
+    const std::array<std::int64_t, 4> voxel{part, corner[0] + static_cast<std::int64_t>(away.x()),
+                                            corner[1] + static_cast<std::int64_t>(away.y()),
+                                            corner[2] + static_cast<std::int64_t>(away.z())};
+    if (std::binary_search(carved.begin(), carved.end(), voxel)) return false;
+  }
+  return true;
+}
+
 FirstLargest largest_of_surface(const Body& body, const std::vector<Vec3>& displacement) {
   constexpr double kMore = 1e-9;  // than rounding
   const SurfaceMotion motion(body, displacement);
   const std::vector<std::uint32_t> around = polygons_around_vertices(body);
+  const CarvedVoxels carved = carved_voxels(body);
   FirstLargest largest = parallel_sum<FirstLargest>(around.size(), [&](std::size_t v) {
     if (around[v] == kNoPolygonAround) return FirstLargest{};
     const Vec3& vertex = body.surface.vertices[v];
-    const std::optional<Vec3> found = motion(around[v], vertex);
-    return found ? moved(*found, vertex, around[v]) : FirstLargest{};
+    const std::optional<CellPoint> cell = locate_on_surface(body, around[v], vertex);
+    if (!cell || !is_left(body, carved, around[v], cell->cell, vertex)) return FirstLargest{};
+    return moved(motion(around[v], *cell, vertex), vertex, around[v]);
   });
-  if (largest.squared < 0) return largest;
+  if (body.surface_cells.empty()) return largest;
   const Triangles triangles = triangulate(body.surface);
   const FirstLargest between = parallel_sum<FirstLargest>(triangles.corners.size(), [&](std::size_t t) {
     const std::uint32_t polygon = triangles.polygon[t];

@@ -15,6 +15,7 @@
 #include "base/human.h"
 #include "base/stop.h"
 #include "formats/lattice/cell_moments.h"
+#include "formats/lattice/fused_points.h"
 #include "simulate/effects/bonds.h"
 #include "simulate/matter/fragments.h"
 #include "simulate/matter/interface_points.h"
@@ -224,8 +225,14 @@ class Conduction {
     return through;
   }
 
-  // Bonds carry forces only. Parts that touch and are not bonded may mean to be insulated: a warning.
+  // Bonds and fused points carry forces only. Parts that touch and are not bonded may mean to be insulated: a warning.
   void refuse_bonded() {
+    if (!fused_points(body_).empty())
+      throw InputError(
+          scene_.name,
+          "an event fused parts of the body, or brought them, and conduction passes no heat from "
+          "one to the other: make them one part, or take temperatures from [thermal] column = "
+          "\"NAME\"");
     if (body_.parts.size() < 2) return;
     const Bonds::Parameters& bonds = scene_.get<Bonds>();
     const std::vector<TouchingGap> named = Bonds::named_gaps(bonds, body_);

@@ -26,6 +26,7 @@
 #include "base/units.h"
 #include "simulate/equilibrium/rigid_link_equilibrium.h"
 #include "simulate/input/scene_words.h"
+#include "simulate/models/rest_shape.h"
 #include "simulate/result/overload.h"
 #include "simulate/result/result.h"
 
@@ -336,7 +337,11 @@ FollowerMemory follower_memory(const Mechanics& mechanics) {
 }
 
 void refuse_free_motions(Mechanics& mechanics, const State& start, const std::string& scene) {
-  mechanics.assemble(start);
+  // Without the stresses that a rest shape gives the body where it starts: what they do to a motion as a whole
+  // says nothing of what holds it.
+  const bool stressed = RestShapes(mechanics.body()).any();
+  const std::vector<Mat3> none(stressed ? mechanics.body().cell_count() : 0, Mat3::Zero());
+  mechanics.assemble(start, {false, stressed ? &none : nullptr});
   mechanics.eliminate_prescribed();
   const std::vector<FreeMotion> free =
       free_motions(mechanics.tangent(), node_geometry(mechanics.body(), start));

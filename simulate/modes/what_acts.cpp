@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "simulate/effects/bonds.h"
 #include "simulate/effects/gravity.h"
+#include "simulate/effects/rigid.h"
 
 namespace flexel::simulate {
 
@@ -23,8 +24,13 @@ void refuse_what_modes_lack(const Scene& scene, const std::vector<ActiveEffect>&
   for (const ActiveEffect& effect : effects)
     if (effect.name != Supports::name && effect.name != Loads::name && effect.name != Gravity::name &&
         effect.name != Bonds::name)
-      throw InputError(scene.name,
-                       fmt::format("[run] {} has no {} ({}): leave it out", what, effect.name, effect.why));
+      throw InputError(
+          scene.name,
+          effect.name == RigidParts::name
+              ? fmt::format("[run] {} has no rigid parts: leave \"rigid\" of [parts.NAME] "
+                            "and [[manipulator]] out",
+                            what)
+              : fmt::format("[run] {} has no {} ({}): leave it out", what, effect.name, effect.why));
   for (const ActiveEffect& effect : effects)
     if (effect->follows())
       throw InputError(

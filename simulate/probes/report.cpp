@@ -164,13 +164,15 @@ void measure_stress(const Problem& problem, const State& state, Body& body, Simu
 
 namespace {
 
-// (parts) Pa; 0: none, or edits changed it, or model `paper`, which has no stresses.
+// (parts) Pa; 0: none, or edits changed it, or model `paper`, which has no stresses, or an orthotropic law, whose
+// strengths along and across the grain no von Mises stress compares with.
 std::vector<double> yields_of_parts(const Body& body, const std::vector<Material>& materials) {
   std::vector<double> yields;
-  for (std::size_t p = 0; p < body.parts.size(); ++p)
-    yields.push_back(body.parts[p].placement == Placement::centre || has_edited_limits(body, body.parts[p])
-                         ? 0
-                         : materials[p].yield);
+  for (std::size_t p = 0; p < body.parts.size(); ++p) {
+    const bool none = body.parts[p].placement == Placement::centre ||
+                      materials[p].law == LawName::orthotropic || has_edited_limits(body, body.parts[p]);
+    yields.push_back(none ? 0 : materials[p].yield);
+  }
   return yields;
 }
 

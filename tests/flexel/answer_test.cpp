@@ -172,5 +172,21 @@ TEST(Answer, AtMostSixLinesHoweverMuchThereIs) {
   for (const std::string& line : lines) EXPECT_EQ(line.find("e+"), std::string::npos) << line;
 }
 
+// Planes have no reaction: at rest they bear what the other forces lack.
+TEST(Answer, PlanesBearWhatLoadsAndReactionsLack) {
+  Case made = with_bar(0.03);
+  made.result.loads.resize(1);
+  made.result.loads[0].force = Vec3(0, 0, -8);
+  made.result.imbalance = Vec3(0, 0, -3);
+  EXPECT_THAT(made.text(), Not(HasSubstr("planes")));
+  made.result.settled.emplace();
+  made.result.settled->tolerance = 1e-5;
+  EXPECT_THAT(made.text(), HasSubstr("held by    \"xmin\" with 5 N along +z, planes with 3 N along +z\n"));
+  made.result.reactions.clear();
+  EXPECT_THAT(made.text(), HasSubstr("held by    planes with 3 N along +z\n"));
+  made.result.imbalance = Vec3(0, 0, -1e-5);
+  EXPECT_THAT(made.text(), HasSubstr("held by    nothing\n"));
+}
+
 }  // namespace
 }  // namespace flexel::commands

@@ -148,6 +148,7 @@ def test_what_is_refused():
              (scene("modes = 3\nrenormalise = true", HELD), "renormalise"), (scene("modes = 0", HELD), "whole number"),
              (scene("modes = 3", '[[load]]\nwhere = "end"\nforce = ["1 N", "0 N", "0 N"]\n'), "fix"),
              (scene("modes = 3", HELD, "[contact]\n"), "contact"), (scene("buckling = 1", HELD), "nothing does"),
+             (scene("modes = 3", "[parts.beam]\nrigid = true\n"), "has no rigid parts"),
              (scene("buckling = 1", HELD, along(-1), model="cells"), "quadratic")]
     for text, fragment in cases:
         write("scene.toml", text)

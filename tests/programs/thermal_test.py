@@ -105,6 +105,8 @@ def test_bonded_parts_do_not_conduct():
     expect(said.count("touch, and parts pass no heat to each other") == 1, said)
     apart = ascii_stl(halves[0], "left") + ascii_stl([[(x + 5, y, z) for x, y, z in t] for t in halves[1]], "right")
     expect("touch" not in between(triangles=apart).err, "parts that are apart do not touch")
+    fuse = '[[event]]\ndo = "fuse"\nwithin = "6 mm"\n'
+    expect_error(between(fuse, triangles=apart, model="cells"), "flexel-simulate", "fused", "no heat")
 
 
 def test_an_infill_conducts_less():
@@ -136,6 +138,54 @@ def test_buckling_by_heat_is_told():
         pathlib.Path("thin.toml").write_text(f'material = "steel"\n[thermal]\nchange = "{change}"\n{HELD}[[fix]]\nwhere = "xmax"\n')
         said = expect_ok(run("flexel-simulate", "thin.toml", "thin.vtu", "-o", "out.vtu", "--no-estimate")).err
         expect(("buckles under less heat" in said) == told, f"{change}: {said}")
+
+
+POINT = '{{ box = {{ min = ["{} mm", "{} mm", "-1 mm"], max = ["{} mm", "{} mm", "0.1 mm"] }} }}'
+
+
+def at_points(*held):
+    """Holds points of the slab's lower side, at x and y in mm, along axes."""
+    return "".join(f'[[fix]]\nwhere = {POINT.format(x - 0.1, y - 0.1, x + 0.1, y + 0.1)}\naxes = "{axes}"\n'
+                   for x, y, axes in held)
+
+
+ONE_POINT = at_points((0, 0, "xyz"))
+THREE_POINTS = at_points((0, 0, "xyz"), (0, 10, "xz"), (100, 0, "z"))  # and what matter does goes on unhindered
+ALLOY = ('material = "alloy"\n[materials.alloy]\nyoung = "100 GPa"\npoisson = 0\ndensity = "1000 kg/m3"\n'
+         'expansion = "20e-6 /K"\n')
+
+
+def slab():
+    pathlib.Path("slab.stl").write_bytes(ascii_stl(box_triangles((100.0, 10.0, 10.0))))
+    expect_ok(run("flexel-voxelize", "slab.stl", "--size", "2.5 mm", "-o", "slab.vtu"))
+
+
+def of_the_slab(scene):
+    pathlib.Path("scene.toml").write_text(scene)
+    return run("flexel-simulate", "scene.toml", "slab.vtu", "-o", "out.vtu", "--summary", "out.json", "--force")
+
+
+def test_what_holds_a_part_does_not_depend_on_its_heat():
+    """Hindered expansion at the start made of a part that three points hold one that is free to turn, and hid of a
+    cooled one that it is free."""
+    slab()
+    for change in (-100, 100, 1000):
+        heat = f'[thermal]\nchange = "{change} K"\n'
+        expect_ok(of_the_slab(ALLOY + THREE_POINTS + heat))
+        far = abs(20e-6 * change) * 0.1 * (1 + 2 * 0.1**2) ** 0.5
+        near(json.loads(pathlib.Path("out.json").read_text())["largest_displacement"], far, 1e-3)
+        expect_error(of_the_slab(ALLOY + ONE_POINT + heat), "flexel-simulate", "free to rotate about x")
+
+
+def test_a_curl_is_no_buckling():
+    """A print that curls by its layers' shrinkage moves in proportion to it. The first answer, of a part that has not
+    moved yet, is stiffened by what the shrinkage pulls."""
+    slab()
+    done = expect_ok(of_the_slab(
+        'material = "PLA"\n' + HELD + '[shrinkage]\nlayer = "0.2 mm"\nalong = "0 %"\nacross = "-0.5 %"\n'
+        'height = ["0 mm", "10 mm"]\nfactor = [0, 1]\n'))
+    expect("buckle" not in done.err, f"nothing buckles: {done}")
+    near(json.loads(pathlib.Path("out.json").read_text())["largest_displacement"], 0.005 / 0.01 * 0.1**2 / 2, 0.05)
 
 
 def test_a_failed_run_leaves_no_free_strain():

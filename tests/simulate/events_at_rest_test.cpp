@@ -4,6 +4,7 @@
 
 #include "base/error.h"
 #include "formats/lattice/body_file.h"
+#include "formats/lattice/fields.h"
 #include "formats/lattice/fused_points.h"
 #include "simulate/scene/scene.h"
 #include "simulate/scene/strength.h"
@@ -77,6 +78,48 @@ TEST(EventsAtRest, CarvingIsThatOfARunInTime) {
   (void)simulate_quietly(timed, rest_scene(kPulled));
   EXPECT_EQ(rest.position, timed.position);
   EXPECT_LT((rest.position.back() - rest.rest.back()).z(), 1.5 * end_of(resting_bar(), "").z()) << "weaker";
+}
+
+// What is told of the largest displacement is of the matter that is left, though the surface goes on.
+TEST(EventsAtRest, WhatIsCarvedAwayHasNoDisplacement) {
+  const std::string pulled = "[[fix]]\nwhere = \"x0\"\n[gravity]\nacceleration = [\"10 m/s2\", 0, 0]\n";
+  Body body = resting_bar();
+  const SimulateResult result = simulate_quietly(
+      body, rest_scene(pulled + "[[event]]\ndo = \"carve\"\nwhere = { half_space = { point = [\"20 mm\", 0, "
+                                "0], normal = [1, 0, 0] } }\n"));
+  double largest = 0;
+  for (std::size_t e = 0; e < body.element_count(); ++e)
+    largest = std::max(largest, (body.position[e] - body.rest[e]).norm());
+  EXPECT_LT(result.largest_displacement_at.x(), 2 * kBarCell + 1e-9);
+  EXPECT_NEAR(result.largest_displacement / largest, 1, 1e-12);
+}
+
+// A tip that was too little for a cell moves with the cell beside it, and goes on to where matter elsewhere is carved.
+TEST(EventsAtRest, WhatWasTooLittleForACellIsNotCarvedAway) {
+  BoxOptions options;
+  options.cells = {6, 2, 2};
+  options.spacing = Vec3::Constant(kBarCell);
+  options.fill = [](int i, int, int) { return i < 5 ? 1.0 : 0.0; };
+  Body body = box_body(options);
+  const SimulateResult result = simulate_quietly(
+      body, rest_scene("[[fix]]\nwhere = \"x0\"\n[gravity]\nacceleration = [\"10 m/s2\", 0, 0]\n[[event]]\n"
+                       "do = \"carve\"\nwhere = { box = { min = [\"19 mm\", \"-1 mm\", \"9 mm\"], max = "
+                       "[\"31 mm\", \"21 mm\", \"21 mm\"] } }\n"));
+  EXPECT_NEAR(result.largest_displacement_at.x(), 6 * kBarCell, 1e-9);
+}
+
+// Frames after an event have the surface of the first one, whose polygons know no cell of theirs.
+TEST(EventsAtRest, ACarvedBodyWhoseSurfaceKnowsNoCells) {
+  Body body = resting_bar();
+  const std::string carve =
+      "[[event]]\ndo = \"carve\"\nwhere = { half_space = { point = [\"20 mm\", 0, 0], normal = [1, 0, 0] } "
+      "}\n";
+  (void)simulate_quietly(
+      body, rest_scene("[[fix]]\nwhere = \"x0\"\n[gravity]\nacceleration = [\"10 m/s2\", 0, 0]\n" + carve));
+  body.surface_cells.clear();
+  body.surface_cell_offsets.clear();
+  body.position.back() = body.rest.back() + Vec3(0, 0, 1);
+  EXPECT_NEAR(largest_displacement(body).value(), 1, 1e-12);
 }
 
 // Two bars half a millimetre apart are one, and stay so in the body.

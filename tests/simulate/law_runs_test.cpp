@@ -89,6 +89,16 @@ TEST(LawRuns, OrthotropicBarDrawnAskew) {
   EXPECT_NEAR(result.stress->value / (force / kArea), 1, 1e-3);
 }
 
+// Of a law whose strengths differ along and across the grain no share of one yield stress is told.
+TEST(LawRuns, AnOrthotropicYieldIsNoLimitOfVonMises) {
+  std::string grain = kGrain;
+  grain.insert(grain.find("density"), "yield = \"1 kPa\"\n");
+  Body body = long_bar();
+  const SimulateResult result = at_equilibrium(body, grain + kDrawnBar + drawn_by(0.004));
+  ASSERT_TRUE(result.stress);
+  EXPECT_FALSE(result.stress->yield_share.has_value());
+}
+
 // Drawn along x to a stretch, free across.
 struct Drawn {
   double stress = 0, energy = 0;  // nominal, Pa; J/m^3
