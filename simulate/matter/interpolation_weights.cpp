@@ -27,12 +27,17 @@ auto key(const Index3& at) {
   return std::tuple(at[2], at[1], at[0]);
 }
 
-// The first element of the part at a lattice index, or element_end.
-std::uint32_t first_at(const Body& body, const Part& part, const Index3& at) {
+// The first element of the part at a lattice index or behind it, or element_end.
+std::uint32_t first_from(const Body& body, const Part& part, const Index3& at) {
   const auto begin = body.lattice_index.begin();
   const auto found = std::lower_bound(begin + part.element_begin, begin + part.element_end, at,
                                       [](const Index3& x, const Index3& y) { return key(x) < key(y); });
-  const auto element = static_cast<std::uint32_t>(found - begin);
+  return static_cast<std::uint32_t>(found - begin);
+}
+
+// The first element of the part at a lattice index, or element_end.
+std::uint32_t first_at(const Body& body, const Part& part, const Index3& at) {
+  const std::uint32_t element = first_from(body, part, at);
   return element < part.element_end && body.lattice_index[element] == at ? element : part.element_end;
 }
 
@@ -72,44 +77,65 @@ InterpolationWeights cell_carrier(const Body& body, const CellPoint& point) {
   return {body.cell_elements[point.cell], point.weights, 8};
 }
 
-std::optional<std::uint32_t> nearest_element(const Problem& problem, std::uint32_t part, const Vec3& point,
-                                             const Vec3& outward) {
-  const Body& body = problem.body;
-  const Part& in = body.parts[part];
-  const Vec3 at = in.lattice.to_lattice(point);
-  const double h = in.lattice.spacing.mean();
+// Of the voxels from `from` to `to` away from home along the axis that goes farthest, those that are not stray, in the
+// order of the elements. A row of voxels is a run of elements.
+std::vector<std::uint32_t> NearestElement::elements_around(std::int32_t from, std::int32_t to) const {
+  const Body& body = problem_.body;
+  const Part& in = body.parts[part_];
+  const Index3& home = *home_;
+  std::vector<std::uint32_t> found;
+  for (std::int32_t k = -to; k <= to; ++k)
+    for (std::int32_t j = -to; j <= to; ++j)
+      for (std::uint32_t e = first_from(body, in, {home[0] - to, home[1] + j, home[2] + k});
+           e < in.element_end; ++e) {
+        const Index3& at = body.lattice_index[e];
+        const std::int32_t i = at[0] - home[0];
+        if (at[2] != home[2] + k || at[1] != home[1] + j || i > to) break;
+        if (std::max({std::abs(i), std::abs(j), std::abs(k)}) >= from && !is_stray(problem_, e))
+          found.push_back(e);
+      }
+  return found;
+}
+
+std::optional<std::uint32_t> NearestElement::operator()(const Vec3& point, const Vec3& outward) {
+  const Body& body = problem_.body;
+  const Lattice& lattice = body.parts[part_].lattice;
+  const Vec3 at = lattice.to_lattice(point);
+  const double h = lattice.spacing.mean();
   const Index3 home{static_cast<std::int32_t>(std::floor(at[0])),
                     static_cast<std::int32_t>(std::floor(at[1])),
                     static_cast<std::int32_t>(std::floor(at[2]))};
+  if (home_ != home) {
+    home_ = home;
+    near_ = elements_around(0, 1);
+    in_ring_.reset();
+  }
   std::optional<std::uint32_t> nearest;
   double least = kReach * h;
   bool inside = false;
-  const auto look = [&](const Index3& d) {
-    const Index3 voxel{home[0] + d[0], home[1] + d[1], home[2] + d[2]};
-    for (std::uint32_t e = first_at(body, in, voxel); e < in.element_end && body.lattice_index[e] == voxel;
-         ++e) {
-      if (is_stray(problem, e)) continue;
-      const Vec3 way = body.rest[e] - point;
-      const bool inward = outward.dot(way) <= 0;
-      const double distance = way.norm();
-      if (distance > kReach * h || (inside && !inward) || (inside == inward && !(distance < least))) continue;
-      nearest = e;
-      least = distance;
-      inside = inward;
-    }
+  const auto look = [&](std::uint32_t e) {
+    const Vec3 way = body.rest[e] - point;
+    const bool inward = outward.dot(way) <= 0;
+    const double distance = way.norm();
+    if (distance > kReach * h || (inside && !inward) || (inside == inward && !(distance < least))) return;
+    nearest = e;
+    least = distance;
+    inside = inward;
   };
-  for (const int width : {1, 2}) {
-    if (width == 2 && inside && least <= kRingBegins * h) break;
-    for (int k = -width; k <= width; ++k)
-      for (int j = -width; j <= width; ++j)
-        for (int i = -width; i <= width; ++i)
-          if (std::max({std::abs(i), std::abs(j), std::abs(k)}) == width || width == 1) look({i, j, k});
-  }
+  std::for_each(near_.begin(), near_.end(), look);
+  if (inside && least <= kRingBegins * h) return nearest;
+  if (!in_ring_) in_ring_ = elements_around(2, 2);
+  std::for_each(in_ring_->begin(), in_ring_->end(), look);
   return nearest;
 }
 
+std::optional<std::uint32_t> nearest_element(const Problem& problem, std::uint32_t part, const Vec3& point,
+                                             const Vec3& outward) {
+  return NearestElement(problem, part)(point, outward);
+}
+
 SurfaceCarriers::SurfaceCarriers(const Problem& problem, std::uint32_t polygon)
-    : problem_(problem), part_(problem.body.surface.polygon_part(polygon)) {
+    : problem_(problem), part_(problem.body.surface.polygon_part(polygon)), nearest_(problem, part_) {
   if (problem.body.parts[part_].placement == Placement::corner) locate_.emplace(problem.body, polygon);
 }
 
@@ -119,7 +145,7 @@ std::optional<InterpolationWeights> SurfaceCarriers::operator()(const Vec3& poin
     if (!at || (at->cell < problem_.stray_cell.size() && problem_.stray_cell[at->cell])) return std::nullopt;
     return cell_carrier(problem_.body, *at);
   }
-  const auto element = nearest_element(problem_, part_, point, outward);
+  const auto element = nearest_(point, outward);
   if (!element) return std::nullopt;
   return InterpolationWeights{{*element}, {1}, 1};
 }

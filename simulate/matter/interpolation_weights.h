@@ -19,6 +19,25 @@ struct InterpolationWeights {
 
 [[nodiscard]] InterpolationWeights cell_carrier(const Body& body, const CellPoint& point);
 
+// The element of a centre-placed part that rests nearest to a point, for many points: the elements in the voxels
+// around are found once for all those in one voxel. Keeps a reference to `problem`.
+class NearestElement {
+ public:
+  NearestElement(const Problem& problem, std::uint32_t part) : problem_(problem), part_(part) {}
+  // Nothing where none lies within two voxels. Those with outward . (element - point) <= 0 go before all
+  // others; a zero vector tells none apart.
+  [[nodiscard]] std::optional<std::uint32_t> operator()(const Vec3& point, const Vec3& outward);
+
+ private:
+  [[nodiscard]] std::vector<std::uint32_t> elements_around(std::int32_t from, std::int32_t to) const;
+
+  const Problem& problem_;
+  std::uint32_t part_;
+  std::optional<Index3> home_;                         // voxel that the others are of
+  std::vector<std::uint32_t> near_;                    // in the 27 voxels around
+  std::optional<std::vector<std::uint32_t>> in_ring_;  // in the 98 around these, once they are asked for
+};
+
 // What carries `point` (m, rest, world frame) on polygon `polygon` of the surface, `outward` the polygon's
 // normal: the cell under it, or the nearest element of the polygon's part, one on the inner side of the
 // surface before any other. Nothing when no cell or no element within two voxels is there or it is stray.
@@ -36,10 +55,10 @@ class SurfaceCarriers {
   const Problem& problem_;
   std::uint32_t part_;
   std::optional<SurfaceLocator> locate_;  // corner placement
+  NearestElement nearest_;                // centre placement
 };
 
-// The element of a centre-placed part that rests nearest to `point`; nothing where none lies within two
-// voxels. Those with outward . (element - point) <= 0 go before all others; a zero vector tells none apart.
+// NearestElement, for one point.
 [[nodiscard]] std::optional<std::uint32_t> nearest_element(const Problem& problem, std::uint32_t part,
                                                            const Vec3& point, const Vec3& outward);
 

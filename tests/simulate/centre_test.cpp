@@ -45,6 +45,19 @@ TEST(Centre, NearestElementIsThatOfASearchOverAll) {
   const Problem problem{body, {}, {}, {}, {}, {}};
   std::mt19937 engine(8);
   std::uniform_real_distribution<double> uniform(-0.5, 1.5);
+  NearestElement kept(problem, 0);  // which has looked in other voxels before
+  const auto nearest_inward = [&](const Vec3& point, const Vec3& outward) {
+    std::optional<std::uint32_t> best;
+    std::pair<bool, double> least{true, 0.2};  // outward; two voxels
+    for (std::uint32_t e = 0; e < body.element_count(); ++e) {
+      const Vec3 way = body.rest[e] - point;
+      const std::pair<bool, double> own{outward.dot(way) > 0, way.norm()};
+      if (own.second > 0.2 || !(own < least)) continue;
+      least = own;
+      best = e;
+    }
+    return best;
+  };
   int found = 0;
   for (int trial = 0; trial < 2000; ++trial) {
     const Vec3 point =
@@ -58,6 +71,10 @@ TEST(Centre, NearestElementIsThatOfASearchOverAll) {
       }
     const auto nearest = nearest_element(problem, 0, point, Vec3::Zero());
     ASSERT_EQ(nearest.has_value(), least <= 0.2) << trial;
+    EXPECT_EQ(kept(point, Vec3::Zero()), nearest) << trial;
+    const Vec3 beside = point + 0.01 * Vec3(uniform(engine), uniform(engine), uniform(engine));
+    for (const Vec3& outward : {Vec3(0, 0, 1), Vec3(0, -1, 0), Vec3(1, 1, 1)})
+      EXPECT_EQ(kept(beside, outward), nearest_inward(beside, outward)) << trial;
     if (!nearest) continue;
     EXPECT_EQ(*nearest, expected);
     ++found;

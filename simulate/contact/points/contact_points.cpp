@@ -108,7 +108,10 @@ double distance_to_polygon(const Surface& surface, const Triangles& triangles, s
 class PolygonsByCube {
  public:
   PolygonsByCube(const std::vector<SurfacePoint>& surface, double width) : width_(kBallReach * width) {
-    for (const SurfacePoint& point : surface) entries_.push_back({cube(point.position), point.polygon});
+    for (const SurfacePoint& point : surface)
+      if (const Entry entry{cube(point.position), point.polygon};
+          entries_.empty() || entries_.back() != entry)
+        entries_.push_back(entry);
     std::sort(entries_.begin(), entries_.end());
     entries_.erase(std::unique(entries_.begin(), entries_.end()), entries_.end());
   }
