@@ -96,6 +96,25 @@ FLEXEL_INLINE Lanes log1p(const Lanes& y) {
   return k * 0.6931471805599453094 + 2 * s * p;
 }
 
+// exp(-x) for x from 0 on, to a few units in the last place; beyond 700 that of 700, some 1e-304. With x = k ln 2 - r,
+// |r| <= ln 2 / 2: 2^-k times the series of exp(r).
+FLEXEL_INLINE Lanes exp_minus(const Lanes& x) {
+  const Lanes limited = x < 700 ? x : Lanes{} + 700;
+  // rounded to whole numbers by adding 2^52 + 2^51, whose last bits are then k
+  const Lanes magic = limited * 1.4426950408889634074 + 6755399441055744.0;
+  const Lanes k = magic - 6755399441055744.0;
+  const Lanes r = (k * 0x1.62e42fefa3800p-1 - limited) + k * 0x1.ef35793c76730p-45;  // ln 2 in two parts
+  Lanes p = Lanes{} + 1;
+#pragma GCC unroll 13
+  for (int n = 13; n > 0; --n) p = 1 + r * p * (1.0 / n);
+  LaneWords bits;
+  __builtin_memcpy(&bits, &magic, sizeof bits);
+  const LaneWords scale_bits = (1023 + 0x4338000000000000ULL - bits) << 52;
+  Lanes scale;
+  __builtin_memcpy(&scale, &scale_bits, sizeof scale);
+  return scale * p;
+}
+
 constexpr int kLanes = 8;
 using FloatLanes = float __attribute__((vector_size(64)));
 constexpr int kFloatLanes = 16;

@@ -30,6 +30,7 @@
 #include "simulate/estimate/error_bars.h"
 #include "simulate/estimate/stress_singularity.h"
 #include "simulate/events/fused.h"
+#include "simulate/joints/joints.h"
 #include "simulate/matter/fragments.h"
 #include "simulate/matter/stress.h"
 #include "simulate/memory.h"
@@ -449,7 +450,10 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
   drop_stuck_places(body, scene, progress);
   const Scene first = scene.events.empty() ? scene : at_the_beginning(scene, body);
   check_actions(first, body, progress);
-  if (!options.resume) Bonds::refuse_joined_apart(first.get<Bonds>(), body);
+  if (!options.resume) {
+    Bonds::refuse_joined_apart(first.get<Bonds>(), body);
+    Joints::refuse_fused(first.get<Joints>(), body);
+  }
   refuse_heat(scene);
   refuse_beyond_memory(body, scene);
   if (options.explain) explain_memory(body, scene, progress);

@@ -4,7 +4,7 @@
 #include "base/files/json.h"
 #include "base/units.h"
 #include "flexel/measure/materials_table.h"
-#include "simulate/input/materials.h"
+#include "simulate/input/hardening.h"
 #include "simulate/thermal/thermal_settings.h"
 
 namespace flexel::commands {
@@ -16,6 +16,13 @@ std::string pressure(double value) {
 
 std::string percent(double share) {
   return share > 0 ? fmt::format("{:.3g} %", 100 * share) : "";
+}
+
+// By how much the yield stress rises with the equivalent plastic strain a.
+std::string hardening(const simulate::Material& material) {
+  if (const auto voce = simulate::voce_hardening(material))
+    return fmt::format("{} (1 - exp(-{:.3g} a))", human_pressure(voce->saturation), voce->rate);
+  return material.hardening > 0 ? human_pressure(material.hardening) + " a" : "";
 }
 
 std::string source_of(const simulate::Material& material) {
@@ -32,6 +39,8 @@ std::vector<std::string> row(const simulate::Material& material) {
           pressure(material.yield),
           pressure(material.strength),
           percent(material.elongation),
+          percent(material.uniform_elongation),
+          hardening(material),
           pressure(material.layer_strength),
           material.friction > 0 ? fmt::format("{:.2g}", material.friction) : "",
           percent(material.damping),
@@ -47,6 +56,8 @@ const std::vector<std::string> kHead = {"name",
                                         "yield",
                                         "strength",
                                         "elongation",
+                                        "uniform elongation",
+                                        "hardening",
                                         "across layers",
                                         "friction",
                                         "damping",
@@ -95,6 +106,8 @@ std::string materials_json() {
     for (const auto& [key, value] : {std::pair{"yield", material.yield},
                                      {"strength", material.strength},
                                      {"elongation", material.elongation},
+                                     {"uniform_elongation", material.uniform_elongation},
+                                     {"hardening", material.hardening},
                                      {"layer_strength", material.layer_strength},
                                      {"friction", material.friction},
                                      {"damping", material.damping}})

@@ -1,6 +1,7 @@
 // Numbers are written so that they come back to the bit.
 #include "formats/lattice/fused_points.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string_view>
 
@@ -36,6 +37,17 @@ std::vector<FusedPoint> fused_points(const Body& body) {
     return parse(line, body.element_count(), points.emplace_back());
   });
   return points;
+}
+
+bool are_fused(const Body& body, const std::vector<FusedPoint>& points, std::uint32_t one,
+               std::uint32_t other) {
+  const auto is_of = [&](const FusedPoint& point, std::uint32_t number) {
+    const Part& part = body.parts[number];
+    return std::any_of(point.elements.begin(), point.elements.end(),
+                       [&](std::uint32_t e) { return e >= part.element_begin && e < part.element_end; });
+  };
+  return std::any_of(points.begin(), points.end(),
+                     [&](const FusedPoint& point) { return is_of(point, one) && is_of(point, other); });
 }
 
 void set_fused_points(Body& body, const std::vector<FusedPoint>& points) {

@@ -21,6 +21,9 @@ struct FusedPoint {
 
 // Of the note; none without. Throws InputError: the note is damaged.
 [[nodiscard]] std::vector<FusedPoint> fused_points(const Body& body);
+// Whether one of them holds part `one` to part `other`.
+[[nodiscard]] bool are_fused(const Body& body, const std::vector<FusedPoint>& points, std::uint32_t one,
+                             std::uint32_t other);
 // Sets the note, or takes it away where there are none.
 void set_fused_points(Body& body, const std::vector<FusedPoint>& points);
 

@@ -7,14 +7,19 @@
 
 namespace flexel::simulate {
 
+// The yield stress at the equivalent plastic strain a: yield + hardening a + saturation (1 - exp(-rate a)), the last term
+// Voce's (Journal of the Institute of Metals 74, 1948).
 struct PlasticFlow {
   double yield = std::numeric_limits<double>::infinity();  // Pa; infinity: elastic
   double hardening = 0;                                    // Pa
+  double saturation = 0, rate = 0;                         // Pa, 1
 };
 
 struct FractureLimits {                                         // infinity: none
   double strength = std::numeric_limits<double>::infinity();    // Pa
   double elongation = std::numeric_limits<double>::infinity();  // plastic strain
+  // Pa, in place of `strength` where the part hardens by Voce's law: the true stress at the load that it stands for
+  double flowing_strength = std::numeric_limits<double>::infinity();
   [[nodiscard]] bool any() const { return std::isfinite(strength) || std::isfinite(elongation); }
 };
 

@@ -152,15 +152,9 @@ void Bonds::refuse_joined_apart(const Parameters& parameters, const Body& body) 
   const std::vector<TouchingGap> named = named_gaps(parameters, body);
   const std::vector<FusedPoint> fused = fused_points(body);
   for (std::size_t n = 0; n < named.size(); ++n) {
-    const auto is_of = [&](const FusedPoint& point, std::uint32_t number) {
-      const Part& part = body.parts[number];
-      return std::any_of(point.elements.begin(), point.elements.end(),
-                         [&](std::uint32_t e) { return e >= part.element_begin && e < part.element_end; });
-    };
     const auto& [a, b] = named[n].parts;
     if (!joined[a] && !joined[b]) continue;
-    if (std::none_of(fused.begin(), fused.end(),
-                     [&](const FusedPoint& point) { return is_of(point, a) && is_of(point, b); }))
+    if (!are_fused(body, fused, a, b))
       throw InputError(
           parameters.named[n].origin,
           fmt::format("parts \"{}\" and \"{}\" of a [[bond]]: one joined in an earlier run, and did not "

@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "simulate/effects/part_entries.h"
+#include "simulate/input/hardening.h"
 #include "simulate/models/connections.h"
 
 namespace flexel::simulate {
@@ -57,7 +58,9 @@ std::optional<Fracture> Fracture::make(const Parameters& parameters, const Probl
         if (elongation > 0) made.limits_[p].elongation = elongation;
         continue;
       }
-      if (strength > 0) made.limits_[p].strength = strength;
+      if (strength > 0) made.limits_[p].strength = made.limits_[p].flowing_strength = strength;
+      if (!entry.strength && material.strength > 0)
+        made.limits_[p].flowing_strength = strength_of_flowing(material);
       if (elongation > 0) made.limits_[p].elongation = elongation;
       made.needs_flow_[p] = elongation > 0 && !(strength > 0);
     }

@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 
 #include "base/error.h"
+#include "base/units.h"
 #include "simulate/effects/part_entries.h"
+#include "simulate/input/hardening.h"
 
 namespace flexel::simulate {
 
@@ -21,6 +23,23 @@ void Plasticity::parse(TableReader& scene, Parameters& parameters) {
     if (entry.hardening && !(*entry.hardening >= 0)) reader.fail("\"hardening\" needs to be 0 or more");
     parameters.entries.push_back(entry);
   }
+}
+
+// What a part does whose yield stress is `yield` [Pa].
+PlasticFlow Plasticity::flow_of(const Entry& entry, const Material& material, double yield) {
+  PlasticFlow flow{yield, entry.hardening.value_or(material.hardening), 0, 0};
+  if (entry.hardening || !(material.uniform_elongation > 0)) return flow;
+  const std::optional<VoceHardening> voce =
+      voce_hardening(yield, material.strength, material.uniform_elongation, material.young);
+  if (!voce)
+    throw InputError(
+        entry.origin,
+        fmt::format("{} hardens up to its strength of {}, and yield = {} is too near to that, or above: take "
+                    "less, or write hardening = \"0 Pa\" for none",
+                    material.name, human_pressure(material.strength), human_pressure(yield)));
+  flow.saturation = voce->saturation;
+  flow.rate = voce->rate;
+  return flow;
 }
 
 std::optional<Plasticity> Plasticity::make(const Parameters& parameters, const Problem& problem) {
@@ -42,7 +61,7 @@ std::optional<Plasticity> Plasticity::make(const Parameters& parameters, const P
             fmt::format("part \"{}\" cannot flow: plasticity is for law \"neo-hooke\", and {} has \"{}\"; "
                         "leave its \"yield\" out, or name another part",
                         problem.body.parts[p].name, material.name, law_name(material.law)));
-      if (yield > 0) made.flow_[p] = {yield, entry.hardening.value_or(material.hardening)};
+      if (yield > 0) made.flow_[p] = flow_of(entry, material, yield);
     }
   for (const PlasticFlow& flow : made.flow_)
     if (std::isfinite(flow.yield)) return made;

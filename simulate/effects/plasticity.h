@@ -1,5 +1,5 @@
-// Plasticity: parts whose material has a yield stress keep part of their deformation. J2 flow with isotropic,
-// linear hardening (Simo and Hughes 1998, box 9.1), cell by cell. Lives in the kernel
+// Plasticity: parts whose material has a yield stress keep part of their deformation. J2 flow with isotropic
+// hardening, linear or Voce's (Simo and Hughes 1998, box 9.1), cell by cell. Lives in the kernel
 // (simulate/kernels/kernel_plastic.h); docs/reference/fracture-plasticity.md.
 #pragma once
 #include "simulate/effects/effect.h"
@@ -27,6 +27,8 @@ class Plasticity : public Effect {
   [[nodiscard]] double kernel_share(const KernelShares& shares) const override { return shares.plasticity; }
 
  private:
+  [[nodiscard]] static PlasticFlow flow_of(const Entry& entry, const Material& material, double yield);
+
   std::vector<PlasticFlow> flow_;  // (parts)
 };
 

@@ -226,10 +226,55 @@ const Material kLibrary[] = {
     library_entry("alumina", 370e9, 0.22, 3900, {}, "99.5 %, read at vertebr.ae"),
 };
 
+struct LibraryHardening {
+  const char* name;
+  double uniform_elongation;  // 0: linear hardening instead
+  double hardening;           // Pa
+  const char* source;
+};
+
+// Uniform elongations by formulas for the kind of metal, of the row's own yield stress and strength; not more than the
+// row's elongation at break.
+const LibraryHardening kLibraryHardening[] = {
+    {"steel", 0.208, 0, "not read: Yun and Gardner 2017, 0.6 (1 - yield / strength)"},
+    {"steel S355", 0.147, 0, "not read: Yun and Gardner 2017, 0.6 (1 - yield / strength)"},
+    {"steel 42CrMo4", 0.06, 0, "not read: the least of Yun and Gardner 2017"},
+    {"stainless", 0.45, 0, "the elongation; not read: Rasmussen 2003, 1 - yield / strength, has 59.6 %"},
+    {"stainless 316", 0.40, 0, "the elongation; not read: Rasmussen 2003, 1 - yield / strength, has 57.7 %"},
+    {"ductile iron", 0.15, 0, "the elongation, for it hardly necks (not read)"},
+    {"aluminium 6061", 0.069, 0, "not read: Su, Young and Gardner 2016, 0.13 (1 - yield / strength) + 0.059"},
+    {"aluminium 6082", 0.077, 0, "not read: Su, Young and Gardner 2016, 0.13 (1 - yield / strength) + 0.059"},
+    {"aluminium 5083", 0.11, 0,
+     "the elongation; not read: Su, Young and Gardner 2016, 0.13 (1 - yield / strength) + 0.059, has 13 %"},
+    {"aluminium 2024", 0.096, 0, "not read: Su, Young and Gardner 2016, 0.13 (1 - yield / strength) + 0.059"},
+    {"aluminium 7075", 0.075, 0, "not read: Su, Young and Gardner 2016, 0.13 (1 - yield / strength) + 0.059"},
+    {"titanium", 0.077, 0, "computed: Hollomon's power law through yield and strength"},
+    {"nickel alloy 718", 0.12, 0,
+     "the elongation; computed: Hollomon's power law through yield and strength has 12.4 %"},
+    {"polycarbonate", 0, 78e6,
+     "3 G, G 26 MPa by Tervoort and Govaert 2000, read at research.tue.nl; it softens first, which is left "
+     "out"},
+};
+
+// Gives a material of the library its uniform elongation or its hardening, and the source of it.
+void add_library_hardening(Material& material) {
+  for (const LibraryHardening& each : kLibraryHardening) {
+    if (material.name != each.name) continue;
+    material.uniform_elongation = each.uniform_elongation;
+    material.hardening = each.hardening;
+    material.source += each.uniform_elongation > 0 ? "; uniform elongation: " : "; hardening: ";
+    material.source += each.source;
+  }
+}
+
 }  // namespace
 
 const std::vector<Material>& material_library() {
-  static const std::vector<Material> library(std::begin(kLibrary), std::end(kLibrary));
+  static const std::vector<Material> library = [] {
+    std::vector<Material> made(std::begin(kLibrary), std::end(kLibrary));
+    for (Material& material : made) add_library_hardening(material);
+    return made;
+  }();
   return library;
 }
 

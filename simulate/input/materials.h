@@ -20,6 +20,8 @@ struct Material {
   double strength = 0;              // Pa, largest principal stress
   double layer_strength = 0;        // Pa, of a print in tension across its layers; no effect takes it
   double elongation = 0;            // equivalent plastic strain at break
+  // Engineering strain at the largest load of a bar, for Voce's law (simulate/input/hardening.h) in place of `hardening`
+  double uniform_elongation = 0;
   // For people to choose from; no effect takes them by itself. 0: not given
   double friction = 0;                          // Coulomb's, against itself
   double damping = 0;                           // share of the critical

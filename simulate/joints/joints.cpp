@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/nearest_word.h"
+#include "formats/lattice/fused_points.h"
 #include "simulate/effects/bonds.h"
 #include "simulate/effects/rigid.h"
 #include "simulate/input/part_names.h"
@@ -105,6 +106,21 @@ void Joints::parse(TableReader& scene, Parameters& parameters) {
         reader.fail(
             fmt::format("joint \"{}\" is there twice: give one of them another \"name\"", joint.name));
     parameters.joints.push_back(std::move(joint));
+  }
+}
+
+void Joints::refuse_fused(const Parameters& parameters, const Body& body) {
+  if (parameters.joints.empty()) return;
+  const std::vector<FusedPoint> fused = fused_points(body);
+  for (const Joint& joint : parameters.joints) {
+    if (joint.parts[1].empty()) continue;
+    if (are_fused(body, fused, require_part(body, joint.parts[0], joint.origin),
+                  require_part(body, joint.parts[1], joint.origin)))
+      throw InputError(
+          joint.origin,
+          fmt::format("parts \"{}\" and \"{}\" are held together by an earlier run ([[event]] fuse, or "
+                      "add where they touched), so joint \"{}\" could not move: leave it out",
+                      joint.parts[0], joint.parts[1], joint.name));
   }
 }
 

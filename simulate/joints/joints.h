@@ -16,6 +16,8 @@ class Joints : public Effect {
   static constexpr const char* name = "joints";
 
   static void parse(TableReader& scene, Parameters& parameters);
+  // Throws InputError: an earlier run fused two parts of a joint, which could not move.
+  static void refuse_fused(const Parameters& parameters, const Body& body);
   // Joins the parts of `rigid` (null: there are none). Throws InputError: an unknown part, one that is not rigid, none
   // that is free, parts that `bonds` (or null) hold together.
   [[nodiscard]] static std::optional<Joints> make(const Parameters& parameters, const Problem& problem,

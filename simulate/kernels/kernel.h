@@ -51,6 +51,7 @@ struct CellConstants {
   ConnectionKind connection[13];  // half_neighbourhood (formats/lattice/body.h)
   double damping;                 // s; 0 in the variants without damping
   double yield, hardening;        // Pa, J2 yield stress and its isotropic, linear hardening
+  double saturation, rate;        // Pa, 1: of Voce's (simulate/conditions/kernel_effects.h)
   double strength, elongation;    // Pa, plastic strain: what breaks a cell; infinity: nothing
                                   // (springs: elongation is the strain of a spring)
   double axes[9];                 // column-major rotation from the lattice to the world frame

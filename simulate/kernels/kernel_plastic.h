@@ -3,8 +3,9 @@
 // J2 flow with the split F = Fe Fp (Simo and Hughes 1998, section 9.3 and box 9.1). What a cell remembers is
 // Cp^-1 and the equivalent plastic strain a. With b = F Cp^-1 F^T, the energy of the cell is W of b in place
 // of F F^T, so the Kirchhoff stress is tau = mu (b - I) + lambda ln J I, its deviator s = mu dev b, and
-//     |s| <= sqrt(2/3) (sigma_y + H a)
-// is kept by shrinking s. The trace of b follows from det b = J^2 (plastic flow keeps the volume): Newton on
+//     |s| <= sqrt(2/3) sigma_y(a)
+// is kept by shrinking s, with the slope of sigma_y at the a before the step: exact where it is linear, and elsewhere
+// right to the square of what flows in a step, which does not add up, for the next step begins at sigma_y of its own a. The trace of b follows from det b = J^2 (plastic flow keeps the volume): Newton on
 // the cubic det(s/mu + x I) = J^2. Then P = tau F^-T.
 //
 // A cell whose rest shape is another than the voxel's (docs/reference/events.md) has Fp with Jp = det Fp other than 1:
@@ -16,7 +17,7 @@
 // |e_m|^2, is bounded as the bending moment of a rectangular section under tension is (Prager and Hodge 1951,
 // M / Mp = 1 - (N / Np)^2, Mp = 3/2 My), but not below 1/20 of the yield stress, which keeps cells that yield
 // from swinging in these modes:
-//     S / S_y <= max(3/2 (1 - |s|^2 / S_y^2), 1/20),   S_y = sqrt(2/3) (sigma_y + H a)
+//     S / S_y <= max(3/2 (1 - |s|^2 / S_y^2), 1/20),   S_y = sqrt(2/3) sigma_y(a)
 //
 // A cell breaks when the largest principal Cauchy stress passes `strength`: when `strength` I - tau / J is no
 // longer positive definite (Sylvester's minors); or when a passes `elongation`.
@@ -140,11 +141,12 @@ FLEXEL_INLINE Yielding flow(const Gradient& g, const CellConstants& k, const Lan
   const Lanes dd = square(d);
   Yielding y;
   y.stress = k.mu * square_root(dd);
-  y.bound = kRootTwoThirds * (k.yield + k.hardening * plastic);
+  const FlowStress yield = flow_stress(k, plastic);
+  y.bound = kRootTwoThirds * yield.stress;
   const LaneMask yields = (y.stress > y.bound) & (fill > 0);
   if (!any(yields)) return y;
   const Lanes elastic = k.mu * (1 + now.trace * (1.0 / 3));  // mu tr b / 3
-  const Lanes multiplier = yields ? (y.stress - y.bound) / (2 * elastic + 2.0 / 3 * k.hardening) : Lanes{};
+  const Lanes multiplier = yields ? (y.stress - y.bound) / (2 * elastic + 2.0 / 3 * yield.slope) : Lanes{};
   const Lanes shrink = yields ? 1 - 2 * elastic * multiplier / y.stress : Lanes{} + 1;
   const Lanes third = determinant(d) * shrink * shrink * shrink, second = 0.5 * dd * shrink * shrink;
   const Lanes wanted = now.change * (2 + now.change);  // J^2 - 1

@@ -6,7 +6,7 @@
 // leave its elements in two or more pieces breaks as a whole.
 //
 // Plasticity: a cell has the Kirchhoff stress of its springs, tau = 1/V sum k e d n (x) n, e = d - l - p the stretch, n
-// the direction. Its deviator s is kept within |s| <= sqrt(2/3) (yield + hardening a), a the equivalent plastic strain,
+// the direction. Its deviator s is kept within |s| <= sqrt(2/3) sigma_y(a), a the equivalent plastic strain,
 // by a flow g N, N = s / |s|, that the rest lengths follow: dp = g l n N n. What a spring is stretched beside the mean of
 // those parallel to it, as in bending, is kept within max(3/2 (1 - m^2), 1/20) of yield / E, m the share of the yield stress
 // that the mean stress takes (simulate/kernels/kernel_plastic.h has the same for cells).
@@ -199,7 +199,8 @@ FLEXEL_INLINE void flow(const Corners& u, const CellConstants& k, const Lanes& f
     square += (c < 3 ? 1 : 2) * deviator[c] * deviator[c];
   }
   const Lanes size = square_root(square), strain = load(memory.strain[0]);
-  const Lanes bound = kRoot * (k.yield + k.hardening * strain);
+  const FlowStress yield = flow_stress(k, strain);
+  const Lanes bound = kRoot * yield.stress;
   const LaneMask yields = (size > bound) & (fill > 0);
   Lanes flowed = {};
   for (int c = 0; c < 6; ++c) deviator[c] = yields ? deviator[c] / size : Lanes{};
@@ -210,7 +211,7 @@ FLEXEL_INLINE void flow(const Corners& u, const CellConstants& k, const Lanes& f
       const Lanes part = along(springs.unit[n], deviator);
       softening += springs.stiffness[n] * springs.length[n] * springs.rest[n] * part * part / volume;
     }
-    flowed = yields ? (size - bound) / (softening + 2 * k.hardening / 3) : Lanes{};
+    flowed = yields ? (size - bound) / (softening + 2 * yield.slope / 3) : Lanes{};
     const Lanes now = strain + kRoot * flowed;
     for (int n = 0; n < 28; ++n) store(memory.strain[n], now);
   }

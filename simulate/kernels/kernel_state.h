@@ -58,6 +58,21 @@ FLEXEL_INLINE void add_to_corners(const ChunkView& chunk, const CellBlock& block
   }
 }
 
+// The yield stress [Pa] at the equivalent plastic strain, and its derivative.
+struct FlowStress {
+  Lanes stress, slope;
+};
+
+FLEXEL_INLINE FlowStress flow_stress(const CellConstants& k, const Lanes& plastic) {
+  FlowStress flow{k.yield + k.hardening * plastic, Lanes{} + k.hardening};
+  if (k.saturation > 0) {
+    const Lanes left = exp_minus(k.rate * plastic);
+    flow.stress += k.saturation * (1 - left);
+    flow.slope += k.saturation * k.rate * left;
+  }
+  return flow;
+}
+
 // What the cells add up to while a chunk is computed.
 struct Sums {
   Lanes smallest_jacobian = Lanes{} + __builtin_huge_val();

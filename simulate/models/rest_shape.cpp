@@ -77,6 +77,40 @@ std::vector<double> shares(const Body& body, const char* name) {
   return result;
 }
 
+// What nothing takes: a column of cells, connections or radii at elements at corners, and one of elements at cells.
+void refuse_misplaced(const Body& body, const char* name, const char* why) {
+  const auto found = body.element_columns.find(name);
+  if (found == body.element_columns.end()) return;
+  for (const Part& part : body.parts) {
+    if (part.placement == Placement::centre) continue;
+    for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
+      if (!all_zero(row(&found->second, e)))
+        throw InputError(fmt::format(
+            "column \"{}\" of elements is not 0 at element {} of part \"{}\", whose elements are at the "
+            "voxels' corners: {}",
+            name, e, part.name, why));
+  }
+}
+
+void refuse_at_cells(const Body& body, const char* name) {
+  const auto found = body.cell_columns.find(name);
+  if (found != body.cell_columns.end() && !all_zero(found->second.values))
+    throw InputError(fmt::format(
+        "column \"{}\" of cells is not 0, and it is one of elements: write it into the point data", name));
+}
+
+void refuse_misplaced_columns(const Body& body) {
+  for (const char* column :
+       {"stiffness_change", "damping_change", "density_change", "strength_change", "yield_change"})
+    refuse_misplaced(body, column, "it is one of cells there, so write it into the cell data");
+  refuse_misplaced(body, "radius_change", "they have no radius");
+  for (const char* column : {"connection_stiffness_change", "connection_damping_change",
+                             "connection_strength_change", "connection_friction_change"})
+    refuse_misplaced(body, column, "only connections of model \"paper\" have factors of their own");
+  for (const char* column : {"friction_change", "radius_change", "stick_change"})
+    refuse_at_cells(body, column);
+}
+
 }  // namespace
 
 RestShapes::RestShapes(const Body& body)
@@ -133,6 +167,7 @@ void refuse_damaged_columns(const Body& body) {
   for (const char* column : {"connection_stiffness_change", "connection_damping_change",
                              "connection_strength_change", "connection_friction_change"})
     (void)connection_values(body, column);
+  refuse_misplaced_columns(body);
 }
 
 std::vector<Vec3> settled_displacement(const Body& body) {

@@ -43,7 +43,8 @@ class RestShapes {
   bool any_ = false;
 };
 
-// Throws InputError: a column that simulations take has another shape than it needs, or a factor in it is not above 0.
+// Throws InputError: a column that simulations take has another shape than it needs, a factor in it is not above 0, or it
+// has values where nothing takes them, such as a factor of cells at their corners.
 void refuse_damaged_columns(const Body& body);
 
 // (elements) m, column "settled"; empty: none.

@@ -22,6 +22,20 @@ double rate(const State& state, const Stretch& now, std::uint32_t from, std::uin
   return now.direction.dot(state.velocity[to] - state.velocity[from]);
 }
 
+struct YieldStress {
+  double stress, slope;  // Pa
+};
+
+// At the equivalent plastic strain; `factor` is on the yield stress alone.
+YieldStress yield_stress(const PlasticFlow& flow, double factor, double strain) {
+  YieldStress now{flow.yield * factor + flow.hardening * strain, flow.hardening};
+  if (!(flow.saturation > 0)) return now;
+  const double left = std::exp(-flow.rate * strain);
+  now.stress += flow.saturation * (1 - left);
+  now.slope += flow.saturation * flow.rate * left;
+  return now;
+}
+
 }  // namespace
 
 ConnectionLosses& ConnectionLosses::operator+=(const ConnectionLosses& other) {
@@ -107,9 +121,9 @@ Mat3 ConnectionYield::flow_of(const State& state, std::uint32_t element, double&
     stress += (stiffness * now.elongation * now.length) * now.direction * now.direction.transpose();
   }
   const Mat3 s = deviator(stress / (2 * volume));
-  const double size = s.norm(), hardening = flow_[part].hardening;
-  const double bound =
-      kRoot * (flow_[part].yield * (yield_.empty() ? 1 : yield_[element]) + hardening * strain);
+  const double size = s.norm();
+  const YieldStress yield = yield_stress(flow_[part], yield_.empty() ? 1 : yield_[element], strain);
+  const double bound = kRoot * yield.stress;
   if (!(size > bound)) return Mat3::Zero();
   const Mat3 normal = s / size;
   double softening = 0;
@@ -120,7 +134,7 @@ Mat3 ConnectionYield::flow_of(const State& state, std::uint32_t element, double&
     const double along = now.direction.dot(normal * now.direction);
     softening += stiffness * now.length * model_.kind(element, entry.kind).length * along * along;
   }
-  const double flowed = (size - bound) / (softening / (2 * volume) + 2 * hardening / 3);
+  const double flowed = (size - bound) / (softening / (2 * volume) + 2 * yield.slope / 3);
   strain += kRoot * flowed;
   return flowed * normal;
 }

@@ -5,10 +5,10 @@
 // give it (connection_factors()).
 //
 // Flow: an element has the Kirchhoff stress of its connections, tau = 1/2V sum k e d n (x) n, e the stretch, d the
-// length, n the direction, V the voxel. Its deviator s is kept within |s| <= sqrt(2/3) (yield + hardening a) by a flow
+// length, n the direction, V the voxel. Its deviator s is kept within |s| <= sqrt(2/3) sigma_y(a) by a flow
 // g N, N = s / |s|, with
-//     g = (|s| - sqrt(2/3) (yield + hardening a)) / (1/2V sum k d l (n N n)^2 + 2/3 hardening),
-// a the equivalent plastic strain, and a connection's rest length follows by l n G n, G the mean of the flows of its
+//     g = (|s| - sqrt(2/3) sigma_y(a)) / (1/2V sum k d l (n N n)^2 + 2/3 sigma_y'(a)),
+// a the equivalent plastic strain, sigma_y that of PlasticFlow, and a connection's rest length follows by l n G n, G the mean of the flows of its
 // two elements (section 3.2). So a pulled bar flows at its yield stress, whatever the lattice's stiffness.
 #pragma once
 #include "simulate/conditions/kernel_effects.h"

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "simulate/input/hardening.h"
 #include "simulate/input/infill.h"
 #include "simulate/input/material_names.h"
 #include "simulate/scene/events.h"
@@ -20,6 +21,23 @@ namespace {
 
 double required_quantity(TableReader& reader, const char* key, Dimension dimension, const char* example) {
   return reader.to_quantity(reader.require(key, example), dimension, key);
+}
+
+void parse_uniform_elongation(TableReader& reader, Material& material) {
+  const std::optional<double> elongation = reader.number("uniform_elongation");
+  if (!elongation) return;
+  if (!(*elongation > 0)) reader.fail("\"uniform_elongation\" needs to be above 0");
+  if (material.hardening > 0)
+    reader.fail("\"hardening\" and \"uniform_elongation\" are two laws of hardening: leave one out");
+  if (!(material.yield > 0) || !(material.strength > 0))
+    reader.fail(
+        "\"uniform_elongation\" needs \"yield\" and \"strength\", between which the material hardens");
+  material.uniform_elongation = *elongation;
+  if (!voce_hardening(material))
+    reader.fail(
+        "no hardening leads from \"yield\" to \"strength\" at \"uniform_elongation\", where the load is to "
+        "be "
+        "largest: the strength is too near to the yield stress, or the elongation hardly more than elastic");
 }
 
 Material parse_material(TableReader& reader, const std::string& name) {
@@ -38,6 +56,7 @@ Material parse_material(TableReader& reader, const std::string& name) {
   material.strength = optional_limit("strength");
   material.layer_strength = optional_limit("layer_strength");
   material.elongation = reader.number("elongation").value_or(0);
+  parse_uniform_elongation(reader, material);
   material.contact_friction = reader.number("friction");
   material.damping = reader.number("damping").value_or(0);
   (void)reader.find("stick");      // simulate/effects/contact.cpp

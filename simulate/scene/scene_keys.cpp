@@ -43,6 +43,7 @@ SceneKeyGroup material_keys() {
        {m, "source", K::text, {}, "the scene's file", "where the figures come from"},
        {m, "yield", K::quantity, D::pressure, "none", "stress at which it flows"},
        {m, "hardening", K::quantity, D::pressure, "0", "stress per plastic strain"},
+       {m, "uniform_elongation", K::number, {}, "none", "strain at the largest load: Voce's hardening"},
        {m, "strength", K::quantity, D::pressure, "none", "stress at which it breaks"},
        {m, "layer_strength", K::quantity, D::pressure, "none", "likewise across the layers of a print"},
        {m, "elongation", K::number, {}, "none", "plastic strain at which it breaks"},

@@ -111,7 +111,9 @@ void Stepper::choose_kernels(const Problem& problem, const KernelEffects& plan) 
     const CellFactors& factors = layout_.kind_factors[kind];
     c.yield = factors.yield * flow.yield;
     c.hardening = flow.hardening;
-    c.strength = factors.strength * limits.strength;
+    c.saturation = flow.saturation;
+    c.rate = flow.rate;
+    c.strength = factors.strength * (flow.saturation > 0 ? limits.flowing_strength : limits.strength);
     c.elongation = factors.strength * limits.elongation;
     step::Composition has{plan.damping[p] > 0 ? step::Damping::plain : step::Damping::none,
                           std::isfinite(flow.yield) || plan.rest_shapes,

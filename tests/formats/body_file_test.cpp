@@ -302,6 +302,22 @@ TEST_F(BodyFile, ABodyWithoutMomentsHasNoArraysOfThem) {
   expect_same(body, read_body(path("good.vtu")));
 }
 
+// Vertices stand for elements of centre-placed parts: what their rows of cell data say would be lost.
+TEST_F(BodyFile, AFactorOfAVertexIsRefused) {
+  Body body = test::random_body(5);
+  ASSERT_GT(body.cell_count(), 0u);
+  const double factor = 0.723456789;
+  body.cell_columns["stiffness_change"] = {1, std::vector<double>(body.cell_count(), factor)};
+  std::string text = written(body);
+  EXPECT_EQ(failure(text), "");
+  const std::string bytes(reinterpret_cast<const char*>(&factor), sizeof factor);
+  const std::size_t last = text.rfind(bytes), after = last + sizeof factor;
+  ASSERT_NE(last, std::string::npos);
+  ASSERT_EQ(text.substr(after, sizeof factor), std::string(sizeof factor, '\0')) << "no vertex follows";
+  text.replace(after, sizeof factor, bytes);
+  EXPECT_THAT(failure(text), testing::HasSubstr("cell data \"stiffness_change\" is not 0 at a vertex"));
+}
+
 TEST_F(BodyFile, AnotherVersionSaysWhichIsRead) {
   const Body body = test::random_body(6);
   std::string text = written(body);

@@ -1,12 +1,14 @@
 """Counts the instructions of a timed run function by function, by valgrind's callgrind: exact, whatever else the machine does."""
 
 import collections
+import json
 import pathlib
 import re
 import subprocess
 
 from shapes import ascii_stl, binary_stl, box_triangles
 
+SUMMARY = "summary.json"  # of runs whose joints may ask for steps of their own
 MATTER = """material = "gum"
 [materials.gum]
 young = "1.2 MPa"
@@ -43,14 +45,18 @@ def make_block(cells):
 
 
 PAIR = MATTER.replace("[parts.block]\n", "").replace('material = "gum"\n', 'material = "gum"\nmodel = "{model}"\n').replace('model = "{model}"\n[run]', "[run]").replace("10 us", "5 us")
-# What a scene says where two parts touch: the blocks of make_pair().
-BETWEEN_PARTS = {
-    "bonded, as parts that touch are by default": "",
-    "`[contact]`": "contact = true\n",
-    "`[contact]`, one part `rigid`": "contact = true\n",
-    "bonded, one part `rigid`": "",
-}
 RIGID = "[parts.upper]\nrigid = true\n"
+BOTH_RIGID = RIGID + "[parts.lower]\nrigid = true\n"
+HINGE = '[[joint]]\nkind = "hinge"\nparts = ["lower", "upper"]\nat = [0, 0, "16 mm"]\naxis = [1, 0, 0]\n'
+# What a scene says where two parts touch, the blocks of make_pair(): at its top, and in tables.
+BETWEEN_PARTS = {
+    "bonded, as parts that touch are by default": ("", ""),
+    "`[contact]`": ("contact = true\n", ""),
+    "`[contact]`, one part `rigid`": ("contact = true\n", RIGID),
+    "bonded, one part `rigid`": ("", RIGID),
+    "both `rigid`": ("bond = false\n", BOTH_RIGID),
+    "both `rigid`, a `[[joint]]` between them": ("bond = false\n", BOTH_RIGID + HINGE),
+}
 
 
 def make_pair(cells):
@@ -65,10 +71,9 @@ def make_pair(cells):
 
 def pair_command(steps, row=None, model="cells"):
     """The same for two blocks; without `row` they do not know of each other."""
-    top = "bond = false\n" if row is None else BETWEEN_PARTS[row]
-    tables = RIGID if row and "rigid" in row else ""
+    top, tables = ("bond = false\n", "") if row is None else BETWEEN_PARTS[row]
     pathlib.Path("scene.toml").write_text(top + PAIR.format(time=5 * steps, model=model) + tables, encoding="utf-8")
-    return ["flexel-simulate", "scene.toml", "block.vtu", "-o", "out.vtu", "--threads", "1", "--quiet"]
+    return ["flexel-simulate", "scene.toml", "block.vtu", "-o", "out.vtu", "--threads", "1", "--quiet", "--summary", SUMMARY]
 
 
 def simulate_command(steps, effect="", model="cells", options=()):
@@ -89,12 +94,17 @@ def count(command):
     return found
 
 
+def counted(command, steps):
+    """Instructions by function, and the steps of the run: those asked for, or where it writes a summary those that it took."""
+    found = count(command)
+    return found, json.loads(pathlib.Path(SUMMARY).read_text(encoding="utf-8"))["timed"]["steps"] if SUMMARY in command else steps
+
+
 def of_a_step(command_for, steps=200):
     """Instructions of one step by function, from runs of `steps` and twice as many; what is done every hundredth step is in it."""
     # one after the other: both may write the same scene.toml
-    short = count(command_for(steps))
-    long = count(command_for(2 * steps))
-    return {f: (long[f] - short[f]) / steps for f in set(short) | set(long) if long[f] != short[f]}
+    (short, fewer), (long, more) = counted(command_for(steps), steps), counted(command_for(2 * steps), 2 * steps)
+    return {f: (long[f] - short[f]) / (more - fewer) for f in set(short) | set(long) if long[f] != short[f]}
 
 
 def kernel_only(functions):

@@ -239,6 +239,31 @@ TEST(ConnectionFactors, DamagedColumnsAreRefusedInOneLine) {
               HasSubstr("leaves nothing of its length"));
 }
 
+// Each column has one place: at elements where these stand for voxels, at cells where there are cells.
+TEST(ConnectionFactors, ColumnsThatNothingTakesAreRefusedByName) {
+  const Scene pull =
+      gum_scene_of("[[fix]]\nwhere = \"xmin\"\n[[load]]\nwhere = \"xmax\"\nforce = [\"0.1 N\", 0, 0]\n");
+  const Body corner = testing::box_body({}), centre = lattice_of({3, 2, 2});
+  const auto with = [&](Body body, bool of_elements, const std::string& name, int components, double value) {
+    const std::size_t rows = of_elements ? body.element_count() : body.cell_count();
+    Columns& columns = of_elements ? body.element_columns : body.cell_columns;
+    columns[name] = {components, std::vector<double>(rows * static_cast<std::size_t>(components), value)};
+    return refusal(body, pull);
+  };
+  for (const char* name :
+       {"stiffness_change", "damping_change", "density_change", "strength_change", "yield_change"}) {
+    EXPECT_EQ(with(centre, true, name, 1, 1), "accepted") << name;
+    EXPECT_EQ(with(corner, false, name, 1, 1), "accepted") << name;
+    EXPECT_EQ(with(corner, true, name, 1, 0), "accepted") << name;
+    EXPECT_THAT(with(corner, true, name, 1, 1), HasSubstr("write it into the cell data")) << name;
+  }
+  EXPECT_THAT(with(corner, true, "radius_change", 1, 1), HasSubstr("no radius"));
+  EXPECT_THAT(with(corner, true, "connection_stiffness_change", 13, 1), HasSubstr("model \"paper\""));
+  for (const char* name : {"friction_change", "radius_change", "stick_change"})
+    EXPECT_THAT(with(corner, false, name, 1, 1), HasSubstr("write it into the point data")) << name;
+  EXPECT_EQ(with(corner, true, "friction_change", 1, 1), "accepted");
+}
+
 // A stiffer damping bounds the step: ten thousand times that of one connection, and the run stays whole.
 TEST(ConnectionFactors, TheStepHeedsTheDampingOfOneConnection) {
   Body body = lattice_of({4, 2, 2});

@@ -13,6 +13,7 @@
 #include "simulate/effects/fracture.h"
 #include "simulate/effects/plasticity.h"
 #include "simulate/events/fused.h"
+#include "simulate/input/hardening.h"
 #include "simulate/matter/masses.h"
 #include "simulate/paper/connection_friction.h"
 #include "tests/sanitized.h"
@@ -129,39 +130,66 @@ TEST(ConnectionYield, ATornBarIsTwoPiecesInTheFileToo) {
   EXPECT_NEAR(later.body.position.back().x() - later.body.position.front().x() - gap, 8e-3, 3e-3);
 }
 
+// A bar that is slowly pulled at both ends by 15 kPa of its first section: the mean of its plastic strain and the stretch, of
+// its middle.
+struct Pulled {
+  TimedCase made;
+  double strain = 0, stretch = 0;
+};
+
+Pulled pulled_slowly(const std::string& material, const std::string& keys) {
+  const double pull = less_if_sanitized(0.3, 0.1, "a third of the time");  // s: tens of the bar's periods
+  const std::string scene = material + keys +
+                            fmt::format(
+                                "[plasticity]\n[damping]\ntime = \"0.3 ms\"\n"
+                                "[[load]]\nwhere = \"xmax\"\nforce = [\"13.5 N\", 0, 0]\ntime = [\"0 s\", "
+                                "\"{} s\"]\nfactor = [0, 1]\n"
+                                "[[load]]\nwhere = \"xmin\"\nforce = [\"-13.5 N\", 0, 0]\ntime = [\"0 s\", "
+                                "\"{} s\"]\nfactor = [0, 1]\n"
+                                "[run]\ntime = \"{} s\"\n",
+                                pull, pull, pull + 0.05);
+  Pulled pulled{run_timed(centre_body(row_of({14, 3, 3})), yielding_scene(scene))};
+  const Body& body = pulled.made.body;
+  const std::vector<double>& strain = body.element_columns.at("plastic_strain").values;
+  double sum = 0, count = 0, ahead = 0, behind = 0;  // of the middle, and of the layers around it
+  for (std::size_t e = 0; e < strain.size(); ++e) {
+    const int layer = body.lattice_index[e][0];
+    if (layer == 4) behind += body.position[e].x() / 9;
+    if (layer == 9) ahead += body.position[e].x() / 9;
+    if (layer <= 4 || layer >= 9) continue;
+    sum += strain[e];
+    count += 1;
+  }
+  pulled.strain = sum / count;
+  pulled.stretch = (ahead - behind) / (5 * kWidth);
+  return pulled;
+}
+
 // sigma = yield + hardening a at the end of a slow pull of true stress P / A0 exp(strain), and that set stays.
 TEST(ConnectionYield, APulledBarFlowsAtItsYieldStress) {
-  const double pull = less_if_sanitized(0.3, 0.1, "a third of the time");  // s: tens of the bar's periods
   for (const char* hooke : less_if_sanitized<std::vector<const char*>>({"paper", "isotropic"}, {"paper"},
                                                                        "one constant of two")) {
-    const double stress = 15e3, yield = 10e3, hardening = 2e5;
-    const std::string scene = fmt::format(
-        "[parts.box]\nhooke = \"{}\"\n[plasticity]\nyield = \"10 kPa\"\nhardening = \"200 "
-        "kPa\"\n[damping]\ntime = \"0.3 ms\"\n"
-        "[[load]]\nwhere = \"xmax\"\nforce = [\"13.5 N\", 0, 0]\ntime = [\"0 s\", \"{} s\"]\nfactor = [0, "
-        "1]\n"
-        "[[load]]\nwhere = \"xmin\"\nforce = [\"-13.5 N\", 0, 0]\ntime = [\"0 s\", \"{} s\"]\nfactor = [0, "
-        "1]\n"
-        "[run]\ntime = \"{} s\"\n",
-        hooke, pull, pull, pull + 0.05);
-    const TimedCase made = run_timed(centre_body(row_of({14, 3, 3})), yielding_scene(scene));
-    EXPECT_LT(book(made.result, "worst_residual"), 5e-3 * book(made.result, "largest_term")) << hooke;
-    const std::vector<double>& strain = made.body.element_columns.at("plastic_strain").values;
-    double sum = 0, count = 0, ahead = 0, behind = 0;  // of the middle, and of the layers around it
-    for (std::size_t e = 0; e < strain.size(); ++e) {
-      const int layer = made.body.lattice_index[e][0];
-      if (layer == 4) behind += made.body.position[e].x() / 9;
-      if (layer == 9) ahead += made.body.position[e].x() / 9;
-      if (layer <= 4 || layer >= 9) continue;
-      sum += strain[e];
-      count += 1;
-    }
+    const Pulled pulled = pulled_slowly("yield = \"10 kPa\"\nhardening = \"200 kPa\"\n",
+                                        fmt::format("[parts.box]\nhooke = \"{}\"\n", hooke));
+    EXPECT_LT(book(pulled.made.result, "worst_residual"), 5e-3 * book(pulled.made.result, "largest_term"))
+        << hooke;
     // Kirchhoff stress: P / A0 times the stretch
-    const double expected = (stress * (ahead - behind) / (5 * kWidth) - yield) / hardening;
-    EXPECT_NEAR(sum / count, expected, 0.05 * expected) << hooke;
-    EXPECT_GT(made.history.column("plasticity dissipated").back(), 0);
-    EXPECT_TRUE(made.body.element_columns.contains("connection_rest"));
+    const double expected = (15e3 * pulled.stretch - 10e3) / 2e5;
+    EXPECT_NEAR(pulled.strain, expected, 0.05 * expected) << hooke;
+    EXPECT_GT(pulled.made.history.column("plasticity dissipated").back(), 0);
+    EXPECT_TRUE(pulled.made.body.element_columns.contains("connection_rest"));
   }
+}
+
+// Likewise by Voce's law, with which the bar bears 20 kPa of its first section at most, at a strain of .2.
+TEST(ConnectionYield, APulledBarHardensByVocesLaw) {
+  const Pulled pulled =
+      pulled_slowly("yield = \"10 kPa\"\nstrength = \"20 kPa\"\nuniform_elongation = 0.2\n", "");
+  EXPECT_LT(book(pulled.made.result, "worst_residual"), 5e-3 * book(pulled.made.result, "largest_term"));
+  const VoceHardening voce = *voce_hardening(10e3, 20e3, 0.2, kYoung);
+  const double expected = -std::log(1 - (15e3 * pulled.stretch - 10e3) / voce.saturation) / voce.rate;
+  EXPECT_NEAR(pulled.strain, expected, 0.05 * expected);
+  EXPECT_GT(pulled.strain, 0.02);
 }
 
 // Equation 20 on two elements: a connection pressed by F_N and slid across loses mu F_N of momentum a second on either

@@ -1,4 +1,5 @@
 // Plastic flow of model `cells`: against closed forms, its energies, its symmetries.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "simulate/input/hardening.h"
 #include "simulate/scene/scene.h"
 #include "tests/sanitized.h"
 #include "tests/scratch.h"
@@ -111,6 +113,70 @@ TEST(Plasticity, SpringsKeepTheirSet) {
     EXPECT_LT(testing::book(result, "worst_residual"), 5e-3 * testing::book(result, "largest_term")) << n;
     for (const double strain : body.cell_columns.at("spring_strain").values)
       EXPECT_NEAR(strain, plastic, 0.05 * plastic) << n;
+  }
+}
+
+// The plastic strain at which a bar of kYieldingBar's yield stress and modulus that hardens by Voce's law bears `nominal` [Pa]
+// of its first section; step by step along the law, for the strain comes back beyond the largest load.
+double plastic_under(double nominal, const VoceHardening& voce) {
+  for (double a = 0;; a += 1e-6) {
+    const double stress = kYield + voce.saturation * (1 - std::exp(-voce.rate * a));
+    if (stress >= nominal * std::exp(a + stress / 1e9)) return a;
+  }
+}
+
+// What the scene has in place of its linear hardening: 3 MPa of the first section at most, at a strain of .2. Six times as
+// slowly, for near its largest load a bar is soft, and so swings slowly; the load stays from 8.4 to 10.8 ms.
+std::string hardening_by_voce(const std::string& more, const std::string& end = "18 ms") {
+  std::string text = kYieldingBar;
+  const auto put = [&](const std::string& old, const std::string& with) {
+    text.replace(text.find(old), old.size(), with);
+  };
+  put("hardening = \"50 MPa\"\n", "strength = \"3 MPa\"\nuniform_elongation = 0.2\n");
+  put("\"1.4 ms\", \"1.8 ms\", \"2.6 ms\"", "\"8.4 ms\", \"10.8 ms\", \"15.6 ms\"");
+  put("time = \"3 ms\"", "time = \"" + end + "\"");
+  return text + more;
+}
+
+TEST(Plasticity, BarsHardenByVocesLaw) {
+  const VoceHardening voce = *voce_hardening(kYield, 3e6, 0.2, 1e9);
+  const double plastic = plastic_under(10 / 4e-6, voce), set = 6e-3 * std::expm1(plastic);
+  for (const bool springs : {false, true}) {
+    std::string text = hardening_by_voce(springs ? "[parts.box]\nmodel = \"springs\"\n" : "");
+    if (springs) text.replace(text.find("poisson = 0.3"), 13, "poisson = 0.25");
+    Body body = box_of({6, 2, 2}, 1e-3);
+    SimulateOptions options;
+    const flexel::test::Scratch scratch;
+    options.history = scratch.path("voce_bar.csv");
+    Progress progress("test", Progress::Mode::quiet);
+    const SimulateResult result = simulate(body, parse_scene(text, "bar.toml"), options, progress);
+    const double within = springs ? 0.05 : 0.02;
+    EXPECT_NEAR(result.probes[0].displacement.x(), set, within * set) << springs;
+    EXPECT_LT(testing::book(result, "worst_residual"), 5e-3 * testing::book(result, "largest_term"))
+        << springs;
+    for (const double strain : body.cell_columns.at(springs ? "spring_strain" : "plastic_strain").values)
+      EXPECT_NEAR(strain, plastic, within * plastic) << springs;
+  }
+}
+
+// A bar of cells bears its strength and no more, though its true stress rises beyond.
+TEST(Plasticity, ABarThatHardensBearsItsStrength) {
+  for (const double share : {0.97, 1.03}) {
+    std::string text = hardening_by_voce("[fracture]\n", share < 1 ? "18 ms" : "10.7 ms");
+    text.replace(text.find("\"10 N\""), 6, fmt::format("\"{} N\"", 12 * share));
+    Body body = box_of({6, 2, 2}, 1e-3);
+    Progress progress("test", Progress::Mode::quiet);
+    (void)simulate(body, parse_scene(text, "bar.toml"), {}, progress);
+    double broken = 0, most = 0;
+    for (std::size_t c = 0; c < body.cell_count(); ++c) broken += body.broken.empty() ? 0 : body.broken[c];
+    for (const double strain : body.cell_columns.at("plastic_strain").values) most = std::max(most, strain);
+    if (share < 1) {
+      EXPECT_EQ(broken, 0);
+      EXPECT_LT(most, std::log(1.2));
+      EXPECT_GT(most, 0.08);
+    } else {
+      EXPECT_GT(broken, 0);
+    }
   }
 }
 
