@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "simulate/quadratic/quadratic_system.h"
 #include "simulate/result/result.h"
@@ -11,6 +12,8 @@ namespace flexel::simulate {
 
 // A stiffness and its preconditioner, which keeps a reference to it.
 struct QuadraticTangent {
+  explicit QuadraticTangent(QuadraticOperator of) : stiffness(std::move(of)) {}
+
   QuadraticOperator stiffness;
   std::optional<QuadraticMultigrid> multigrid = std::nullopt;
 };
