@@ -70,8 +70,8 @@ Mat3 predicted_stress(const Law& law, const Mat3& h, const Mat3& second, const M
          2 * (law.mu - law.lambda * at.log_volume) * turned * metric;
 }
 
-// d2W/dF2 has, with s the singular values of F, entries of at most mu + (mu + lambda (1 - ln J)) / s_min^2; at
-// rest 2 mu + lambda.
+// d2W/dF2 has, with s the singular values of F, entries of at most mu + (mu + lambda (1 - ln J)) / s_min^2, or, of
+// swollen matter, mu + (lambda ln J - mu) / s_min^2; at rest 2 mu + lambda. A negative lambda counts with ln J alone.
 // With plastic flow mu is that of b = F Cp^-1 F^T: at most 1 / s_min^2 where the flow follows F. With a rest
 // shape mu is times the largest eigenvalue of Cp^-1, ln J less ln Jp, and all times Jp.
 double stiffening(const Law& law, const Mat3& h, const Flow& flow) {
@@ -82,9 +82,13 @@ double stiffening(const Law& law, const Mat3& h, const Flow& flow) {
   eigen.computeDirect(f.transpose() * f, Eigen::EigenvaluesOnly);
   const double least = std::max(eigen.eigenvalues()[0], 1e-12);
   const double log_volume = std::log(jacobian / flow.volume);
-  const double coupling = law.mu + law.lambda * (1 - log_volume);
+  const double swelling = std::max(law.lambda, 0.0);        // below 0 the stiffest is a shear
+  const double turning = law.mu - law.lambda * log_volume;  // below 0: stiffest against spin
   const double own = std::max(flow.follows ? law.mu / std::min(least, 1.0) : law.mu, law.mu * flow.metric);
-  return flow.volume * (own + std::max(coupling, 0.0) / least) / (2 * law.mu + law.lambda);
+  const auto growth = [&](double swell) {
+    return (own + std::max(turning + swell, -turning) / least) / (2 * law.mu + swell);
+  };
+  return flow.volume * std::max(growth(swelling), growth(3 * swelling));  // along one axis, along all
 }
 
 }  // namespace neo_hooke
