@@ -12,7 +12,8 @@ std::optional<VoceHardening> voce_hardening(double yield, double strength, doubl
   const double stress = strength * (1 + uniform_elongation);
   const double strain = std::log1p(uniform_elongation) - stress / young, rise = stress - yield;
   const double slope = stress / (1 - stress / young);
-  if (!(strain > 0) || !(rise > slope * strain)) return std::nullopt;
+  // The slope dt/de is t at the largest load, and no material's is above E.
+  if (!(stress < young) || !(strain > 0) || !(rise > slope * strain)) return std::nullopt;
   // rise = saturation (1 - exp(-x)), slope = saturation rate exp(-x), x = rate strain
   const auto is_too_steep = [&](double x) { return rise * x > slope * strain * std::expm1(x); };
   double low = 0, high = 1;

@@ -107,7 +107,9 @@ void refuse_misplaced_columns(const Body& body) {
   for (const char* column : {"connection_stiffness_change", "connection_damping_change",
                              "connection_strength_change", "connection_friction_change"})
     refuse_misplaced(body, column, "only connections of model \"paper\" have factors of their own");
-  for (const char* column : {"friction_change", "radius_change", "stick_change"})
+  for (const char* column :
+       {"friction_change", "radius_change", "stick_change", "connection_stiffness_change",
+        "connection_damping_change", "connection_strength_change", "connection_friction_change"})
     refuse_at_cells(body, column);
 }
 

@@ -261,6 +261,8 @@ TEST(ConnectionFactors, ColumnsThatNothingTakesAreRefusedByName) {
   EXPECT_THAT(with(corner, true, "connection_stiffness_change", 13, 1), HasSubstr("model \"paper\""));
   for (const char* name : {"friction_change", "radius_change", "stick_change"})
     EXPECT_THAT(with(corner, false, name, 1, 1), HasSubstr("write it into the point data")) << name;
+  EXPECT_THAT(with(corner, false, "connection_damping_change", 13, 1),
+              HasSubstr("write it into the point data"));
   EXPECT_EQ(with(corner, true, "friction_change", 1, 1), "accepted");
 }
 

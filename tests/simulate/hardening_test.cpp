@@ -59,6 +59,7 @@ TEST(Hardening, ThereIsNoneUpToAStrengthBelowTheYieldStress) {
   EXPECT_FALSE(voce_hardening(300e6, 300e6, 0.2, 200e9));
   EXPECT_FALSE(voce_hardening(300e6, 400e6, 0.001, 200e9)) << "less than its elastic strain";
   EXPECT_FALSE(voce_hardening(300e6, 400e6, 0, 200e9));
+  EXPECT_FALSE(voce_hardening(1e4, 1.5e5, 9, 1e6)) << "a true stress above the modulus";
   EXPECT_TRUE(voce_hardening(300e6, 400e6, 0.2, 200e9));
 }
 
