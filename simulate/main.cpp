@@ -197,6 +197,7 @@ int run(int argc, char** argv) {
   const StopEndsProcess nothing_is_left;
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   Progress progress("flexel-simulate", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
+  const KeptWarnings warnings;  // for the summary
   SimulateOptions& options = arguments.options;
   if (!arguments.checkpoint_every.empty()) {
     if (options.checkpoint.empty() && arguments.resume.empty())
@@ -220,7 +221,6 @@ int run(int argc, char** argv) {
   const bool series = extension(arguments.output) == "pvd";
   if (series) options.series = arguments.output;
   OutputsTogether outputs({series ? "" : arguments.output, options.history, arguments.summary});
-  const KeptWarnings warnings;  // for the summary
   const SimulateResult result = simulate::simulate(body, scene, options, progress);
   const auto summary = [&] { return summary_json(result, body, warnings.lines()); };
   if (arguments.verbose || options.explain)

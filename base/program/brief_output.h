@@ -30,8 +30,8 @@ class HeldWarnings {
   int exceptions_;
 };
 
-// While one lives, each different line that Progress::warn() prints is kept too, for whoever shows it again. Process-wide;
-// not nested.
+// While one lives, each different line that Progress::warn() prints is kept too, for whoever shows it again. Process-wide; of
+// one within another (a run that a callback of Python's starts) each line is kept by the inner one alone.
 class KeptWarnings {
  public:
   KeptWarnings();
@@ -39,6 +39,10 @@ class KeptWarnings {
   KeptWarnings(const KeptWarnings&) = delete;
   KeptWarnings& operator=(const KeptWarnings&) = delete;
   [[nodiscard]] std::vector<std::string> lines() const;
+
+ private:
+  std::vector<std::string> outer_;
+  bool outer_keeps_;
 };
 
 }  // namespace flexel

@@ -91,13 +91,12 @@ std::vector<std::string> HeldWarnings::take() {
   return std::exchange(held_warnings, {});
 }
 
-KeptWarnings::KeptWarnings() {
-  keeps_warnings = true;
-}
+KeptWarnings::KeptWarnings()
+    : outer_(std::exchange(kept_warnings, {})), outer_keeps_(std::exchange(keeps_warnings, true)) {}
 
 KeptWarnings::~KeptWarnings() {
-  keeps_warnings = false;
-  kept_warnings.clear();
+  keeps_warnings = outer_keeps_;
+  kept_warnings = std::move(outer_);
 }
 
 std::vector<std::string> KeptWarnings::lines() const {

@@ -145,7 +145,18 @@ Json colours_json() {
   return {{"palette", palette}, {"tints", tints}, {"nothing", hex(picture::colour_of_nothing())}};
 }
 
-// Those that are not there yet.
+// Unless it is there: what a stage of flexel deform tells has the scene's name before it among those of the command.
+void add_different(const std::string& text, Json& warnings) {
+  for (Json& each : warnings) {
+    const auto there = each.get<std::string>();
+    if (there.ends_with(text)) return;
+    if (!text.ends_with(there)) continue;
+    each = text;
+    return;
+  }
+  warnings.push_back(text);
+}
+
 void collect_warnings(const Json& value, Json& warnings) {
   if (!value.is_structured()) return;
   for (const auto& [key, inner] : value.items()) {
@@ -153,10 +164,8 @@ void collect_warnings(const Json& value, Json& warnings) {
       collect_warnings(inner, warnings);
       continue;
     }
-    for (const Json& each : inner) {
-      const Json text = each.is_string() ? printable(each.get<std::string>()) : json_text(each);
-      if (std::find(warnings.begin(), warnings.end(), text) == warnings.end()) warnings.push_back(text);
-    }
+    for (const Json& each : inner)
+      add_different(each.is_string() ? printable(each.get<std::string>()) : json_text(each), warnings);
   }
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "base/program/brief_output.h"
 #include "tests/base/heard.h"
 
 namespace flexel {
@@ -44,6 +45,22 @@ TEST(Progress, OfASilentRunNothingIsHeard) {
   ProgressStretch stretch(silent, 0, 1);
   stretch.inner().update(0.5);
   EXPECT_TRUE(heard.stages.empty());
+}
+
+TEST(Progress, EachRunKeepsItsOwnWarnings) {
+  using Lines = std::vector<std::string>;
+  const Heard heard;  // in place of stderr
+  Progress progress("flexel", Progress::Mode::lines);
+  const KeptWarnings outer;
+  progress.warn("before");
+  {
+    const KeptWarnings inner;
+    progress.warn("within");
+    EXPECT_EQ(inner.lines(), Lines{"within"});
+  }
+  progress.warn("after");
+  EXPECT_EQ(outer.lines(), (Lines{"before", "after"}));
+  EXPECT_EQ(heard.lines, (Lines{"before", "within", "after"}));
 }
 
 TEST(Progress, TimeLeftIsToldFromTwoSecondsOn) {

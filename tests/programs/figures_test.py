@@ -71,5 +71,14 @@ def test_paper():
     run_model("paper", "--placement", "centre")
 
 
+def test_a_warning_before_a_run_is_in_its_summary():
+    held, pushed = faces(askew())
+    write("scene.toml", f'material = "steel"\n[[fix]]\nwhere = "{held}"\n[[load]]\nwhere = "{pushed}"\nforce = [0, 0, "-10 N"]\n')
+    expect_ok(run("flexel-voxelize", "box.stl", "--size", "4 mm", "-o", "box.vtu"))
+    told = expect_ok(run("flexel-simulate", "scene.toml", "box.vtu", "-o", "bent.ply", "--summary", "s.json", "--no-estimate", "--quiet")).err
+    warnings = json.loads(pathlib.Path("s.json").read_text(encoding="utf-8"))["warnings"]
+    expect("bent.ply gets a body" in told and told == "".join(f"flexel-simulate: warning: {line}\n" for line in warnings), f"{warnings}, and {told}")
+
+
 if __name__ == "__main__":
     main(globals())

@@ -114,6 +114,17 @@ TEST(Page, TextOfFilesIsNoPartOfIt) {
   }
 }
 
+// Of flexel deform: that of a stage, and that of the command, which has the scene's name before it.
+TEST(Page, AWarningOfASummaryIsShownOnce) {
+  PageOptions options;
+  options.words.summary =
+      R"({"simulate":{"warnings":["it turned"]},"warnings":["a.toml: it turned","b.toml: it slid"]})";
+  const std::string page = make_page({shown(tube(6))}, options, true).html;
+  const auto list = page.find(R"("warnings":["a.toml: it turned","b.toml: it slid"])");
+  ASSERT_NE(list, page.npos);
+  EXPECT_NE(page.find(R"("warnings":["a.toml: it turned","b.toml: it slid"])", list + 1), page.npos);
+}
+
 TEST(Page, IsLightAndRepeatable) {
   EXPECT_LT(page_weight(), 2'000'000U);
   EXPECT_EQ(make_page({shown(tube(6))}, {}, true).html, make_page({shown(tube(6))}, {}, true).html);
