@@ -261,9 +261,11 @@ SimulateResult Run::operator()() {
   const bool from_rest = std::all_of(state_.displacement.begin(), state_.displacement.end(),
                                      [](const Vec3& u) { return u.isZero(0); });
   const EquilibriumResult solved = solve(mechanics);
-  // Hindered free strain stiffens or softens the first answer: it says nothing of buckling.
-  if (from_rest && !solved.buckled && !body_.cell_columns.contains(kFreeStrainColumn))
-    linear_reach_ = solved.linear_reach;
+  // Hindered free strain stiffens or softens the first answer, which says nothing of buckling then.
+  if (from_rest && !solved.buckled)
+    linear_reach_ = body_.cell_columns.contains(kFreeStrainColumn)
+                        ? linear_reach_beside_free_strain(mechanics)
+                        : solved.linear_reach;
   const StopWaits answered;  // what is found is told: the rest takes moments
   buckled_ = solved.buckled;
   followers_ = follower_memory(mechanics);

@@ -383,6 +383,23 @@ void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const
                   point_name(body.rest[first])));
 }
 
+double linear_reach_beside_free_strain(Mechanics& mechanics) {
+  const std::vector<ActiveEffect>& effects = mechanics.effects();
+  const std::vector<Motion>& motions = mechanics.constraints().motions;
+  if (mechanics.follows() ||
+      std::none_of(effects.begin(), effects.end(),
+                   [](const ActiveEffect& effect) { return effect->drives(); }) ||
+      std::any_of(motions.begin(), motions.end(),
+                  [](const Motion& motion) { return motion.link != nullptr; }))
+    return 0;
+  NewtonOptions options;
+  options.steps = NewtonSteps::full;
+  options.max_iterations = 1;
+  options.unstressed = true;
+  State rest{std::vector<Vec3>(mechanics.body().element_count(), Vec3::Zero()), 1};
+  return newton(mechanics, rest, options, [](double, const std::string&) { check_stop(); }).first_reach;
+}
+
 EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state, const RunSettings& settings,
                                    Progress& progress, const CoarseStart& start) {
   return LoadStepping(mechanics, state, settings, progress, start)();

@@ -36,6 +36,10 @@ void refuse_free_motions(Mechanics& mechanics, const State& start, const std::st
 // it, resist nothing in that direction: throws InputError(scene, ...) naming part, number and place.
 void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const std::string& scene);
 
+// m: the largest displacement of the linear answer under the whole load, from the lattice's shape, as if free strain
+// made no stresses there. Zero where only free strain moves the body, and where loads follow or act by rigid links.
+[[nodiscard]] double linear_reach_beside_free_strain(Mechanics& mechanics);
+
 // Moves `state` to equilibrium under the whole load. Throws DivergedError naming load step, iteration, the
 // worst cell and a suggestion; Interrupted and TimeoutError (base/stop.h). `state` is then the last one in
 // equilibrium.

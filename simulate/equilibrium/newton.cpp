@@ -74,6 +74,7 @@ class Solver {
         progress_(progress),
         kept_(memory ? *memory : own_) {
     if (kept_.projected) kept_.factored = false;
+    if (options.unstressed) predicted_stress_.assign(mechanics.body().cell_count(), Mat3::Zero());
   }
 
   NewtonOutcome run();
@@ -123,7 +124,7 @@ class Solver {
   bool indefinite_ = false;  // conjugate gradients met negative curvature in the last solve
   double longest_step_ = 0;
   std::optional<State> before_;  // where the last full step began, until its stresses have been predicted
-  // (cells) Pa, predicted by the last full step's linear model; empty before it and for lowering steps
+  // (cells) Pa, predicted by the last full step's linear model; before it empty, or zero; empty for lowering steps
   std::vector<Mat3> predicted_stress_;
 };
 

@@ -22,6 +22,8 @@ struct NewtonOptions {
   int max_iterations = 40;
   double least_scale = 0;  // N, that the residual is measured against at least
   DirectLimit direct;      // of aggregation_multigrid()
+  bool unstressed =
+      false;  // the first tangent has no geometric stiffness: the linear answer of unstressed matter
   // m: a first linear answer that reaches further ends the attempt
   double farthest_reach = std::numeric_limits<double>::infinity();
 };

@@ -1,8 +1,8 @@
-// With F = I + H of a cell and A = sym(F^T dF/dt), its dissipation tau V (lambda tr^2 A + 2 mu A:A) has the
-// blocks
-//     C_ab = tau V / 16 { lambda (F g_a)(F g_b)^T + mu (g_a . g_b) F F^T + mu (F g_b)(F g_a)^T },
-// g the gradients gamma of simulate/models/cell_model.h; of an orthotropic material the moduli C at rest in place
-// of lambda and mu, F C(g_a, g_b) F^T. The hourglass displacements q_m resist their rate as seen
+// With F = I + H of a cell, J = det F and A = sym(F^T dF/dt), its dissipation tau V (K (dJ/dt)^2 + 2 mu |dev A|^2),
+// K = lambda + 2 mu / 3, has the blocks
+//     C_ab = tau V / 16 { K (c_a)(c_b)^T + mu (g_a . g_b) F F^T + mu (F g_b)(F g_a)^T - 2 mu / 3 (F g_a)(F g_b)^T },
+// g the gradients gamma of simulate/models/cell_model.h, c = cof F g; of an orthotropic material the moduli C at
+// rest, F C(g_a, g_b) F^T. The hourglass displacements q_m resist their rate as seen
 // by an observer that turns with the cell, q' = dq/dt - w x q = sum_b B_mb v_b with the spin w = 1/2 sum_b
 // F^-T g_b / 4 x v_b; they add tau c_m B_ma^T B_mb. A spring from a to b along the unit vector d adds tau k d
 // d^T. Each row is gathered by one thread from its cells in ascending order.
@@ -31,7 +31,9 @@ Vec3 hourglass(const CellVectors& u, int mode) {
 std::array<Mat3, 8> damping_row(const CellKind& kind, const CellVectors& u, std::size_t a) {
   const Mat3 f = Mat3::Identity() + displacement_gradient(kind, u);
   const Mat3 turned = f.inverse().transpose(), metric = f * f.transpose();
-  const Vec3 at = f * kind.gradient[a];
+  const Mat3 cofactor = f.determinant() * turned;
+  const Vec3 at = f * kind.gradient[a], swells = cofactor * kind.gradient[a];
+  const double bulk = kind.lambda + 2 * kind.mu / 3;
   std::array<Mat3, 8> row;
   const bool orthotropic = kind.law.name == LawName::orthotropic;
   const Mat9 moduli = orthotropic ? elasticity(kind, Mat3(Mat3::Zero())) : Mat9(Mat9::Zero());
@@ -46,8 +48,9 @@ std::array<Mat3, 8> damping_row(const CellKind& kind, const CellVectors& u, std:
     }
     const Vec3 other = f * kind.gradient[b];
     row[b] = kind.volume / 16 *
-             (kind.lambda * at * other.transpose() +
-              kind.mu * (kind.gradient[a].dot(kind.gradient[b]) * metric + other * at.transpose()));
+             (bulk * swells * (cofactor * kind.gradient[b]).transpose() +
+              kind.mu * (kind.gradient[a].dot(kind.gradient[b]) * metric + other * at.transpose() -
+                         2.0 / 3 * at * other.transpose()));
   }
   for (int mode = 0; mode < 4; ++mode) {
     const Mat3 arm = cross_matrix(hourglass(u, mode));

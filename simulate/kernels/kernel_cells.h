@@ -69,18 +69,25 @@ FLEXEL_INLINE void add_damping(const Gradient& g, const Modes u[3], const Modes 
                                           g.h.at[2][i] * rate.at[2][j]);
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) strain_rate.at[i][j] = product.at[i][j] + product.at[j][i];  // 2 A
-  const Lanes pressure =
-      (0.5 * k.damping * k.lambda) * (strain_rate.at[0][0] + strain_rate.at[1][1] + strain_rate.at[2][2]);
+  const Lanes mean =
+      (k.damping * k.mu / 3) * (strain_rate.at[0][0] + strain_rate.at[1][1] + strain_rate.at[2][2]);
   Matrix s;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
-      s.at[i][j] = (k.damping * k.mu) * strain_rate.at[i][j] + (i == j ? pressure : Lanes{});
+      s.at[i][j] = (k.damping * k.mu) * strain_rate.at[i][j] - (i == j ? mean : Lanes{});
   if (k.law.name == LawName::orthotropic) {
     Matrix half, made;
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) half.at[i][j] = (0.5 * k.damping) * strain_rate.at[i][j];
     stress_at_rest_of_law(k.law, half, made);
     s = made;
+  } else {
+    Lanes swelling = {};  // dJ/dt
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) swelling += g.cofactor.at[i][j] * rate.at[i][j];
+    const Lanes pressure = (k.damping * (k.lambda + 2 * k.mu / 3)) * swelling;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) stress.at[i][j] += pressure * g.cofactor.at[i][j];
   }
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)

@@ -8,9 +8,10 @@
 //     f_a = -fill { V/4 sum_j P_.j s_aj / h_j + 1/8 sum_m c_m s_ma q_m }:  the same transform backwards.
 // P is that of the part's law (simulate/laws).
 //
-// Damping with time tau is the power of the rate of strain: S_v = tau (lambda tr A I + 2 mu A), A = sym(F^T
-// dF/dt), P_v = F S_v, and for the hourglass modes of their rate as seen by an observer that turns with the
-// cell, q' = dq/dt
+// Damping with time tau is the power of the rate of strain, A = sym(F^T dF/dt) without its trace, and of that of the
+// volume: P_v = tau (2 mu F dev A + K dJ/dt cof F), K = lambda + 2 mu / 3. (The trace of A is not 0 at constant volume
+// where F is far from a rotation, and K may be thousands of mu.) Of orthotropic laws P_v = tau F C A, C the moduli at
+// rest. For the hourglass modes it is that of their rate as seen by an observer that turns with the cell, q' = dq/dt
 // - w x q, w the spin of dF/dt F^-1. The dissipation does not change under any rigid motion of the
 // velocities, so linear and angular momentum are kept exactly.
 //

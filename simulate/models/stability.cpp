@@ -93,6 +93,20 @@ Polar polar(const Mat3& f) {
           stretch[2], stretch[0]};
 }
 
+// By how much at most |dF/dt| counts more than at rest, in the square root of K (dJ/dt)^2 + 2 mu |dev A|^2: that of
+// orthotropic moduli is at most the longest stretch. With that at rest of A alone and of the rest, K ((cof F - F) : dF/dt)^2;
+// or with the sum of both.
+double rate_growth(const CellKind& kind, const Mat3& f, const Polar& of) {
+  const double longest = std::max(1.0, of.longest);
+  if (kind.law.name == LawName::orthotropic) return longest;
+  Mat3 cofactor;
+  for (int i = 0; i < 3; ++i) cofactor.col(i) = f.col((i + 1) % 3).cross(f.col((i + 2) % 3));
+  const double bulk = 3 * kind.lambda + 2 * kind.mu, shear = 2 * kind.mu;
+  const double apart = longest + (cofactor - f).norm() / std::sqrt(3.0);
+  const double sum = bulk * cofactor.squaredNorm() / 3 + shear * of.longest * of.longest;
+  return std::max(1.0, std::min(apart, std::sqrt(sum / std::max(bulk, shear))));
+}
+
 // Over the largest eigenvalue at rest, `largest` [N/m]. The square root of a sum of dissipations is at most the sum
 // of theirs: that at rest, grown by the stretch, and that by the spin of hourglass displacements. |dF/dt|^2 is at
 // most 1 / (2 h^2) of the velocities' squares; unequal spacings bound as in cell_stiffening().
@@ -108,7 +122,7 @@ double damping_growth(const CellKind& kind, const Vec3& spacing, const CellVecto
   }
   turned /= 2 * std::pow(of.shortest * spacing.minCoeff(), 2);
   const double ratio = spacing.maxCoeff() / spacing.minCoeff();
-  return std::pow(ratio * std::max(1.0, of.longest) + std::sqrt(turned / largest), 2);
+  return std::pow(ratio * rate_growth(kind, f, of) + std::sqrt(turned / largest), 2);
 }
 
 // Likewise: springs turn against the cell. At most Gershgorin's bound, each row's sum.

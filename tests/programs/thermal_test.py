@@ -188,6 +188,16 @@ def test_a_curl_is_no_buckling():
     near(json.loads(pathlib.Path("out.json").read_text())["largest_displacement"], 0.005 / 0.01 * 0.1**2 / 2, 0.05)
 
 
+def test_a_warm_column_about_to_buckle_is_told():
+    """It buckles at about pi^2 E I / (4 L^2) = 20.6 kN (Euler), and its warmth, which nothing hinders, does not hide that."""
+    slab()
+    for model, force, near_it in (("cells", 19000, True), ("cells", 4000, False), ("quadratic", 19000, True)):
+        said = expect_ok(of_the_slab(
+            f'model = "{model}"\n' + ALLOY + HELD + '[thermal]\nchange = "1 K"\n[[load]]\nwhere = "xmax"\n'
+            f'force = ["-{force} N", 0, "20 N"]\n')).err
+        expect(("about to buckle: it moves" in said) == near_it, f"{model}, {force} N: {said}")
+
+
 def test_a_failed_run_leaves_no_free_strain():
     pathlib.Path("bar.stl").write_bytes(ascii_stl(box_triangles()))
     expect_ok(run("flexel-voxelize", "bar.stl", "--size", "2 mm", "-o", "bar.vtu"))

@@ -148,6 +148,28 @@ TEST_P(KernelOf, BoundIsSafeAndNotWasteful) {
   }
 }
 
+// What keeps its volume is damped by the shear modulus alone, however far it is drawn.
+TEST(KernelDamping, HasNoBulkModulusAtConstantVolume) {
+  const Body body = rough_body({5, 4, 3}, Vec3::Constant(0.01));
+  const Mat3 drawn = Vec3(1.5, 1 / std::sqrt(1.5), 1 / std::sqrt(1.5)).asDiagonal();
+  Mat3 rate;  // without a trace
+  rate << 2, 0.5, -0.3, 0.7, -1.5, 0.2, 0.1, -0.4, -0.5;
+  std::vector<std::vector<Vec3>> found;
+  for (const double poisson : {0.3, 0.4999}) {
+    Material material{"gum", 2e6 * (1 + poisson), poisson, 1000, "test"};
+    const Problem problem = testing::problem_of(body, material, Model::cells);
+    State state = shaken(body, 0, 1);
+    for (std::size_t e = 0; e < body.element_count(); ++e) {
+      state.displacement[e] = drawn * body.rest[e] - body.rest[e];
+      state.velocity[e] = rate * drawn * body.rest[e];
+    }
+    found.push_back(forces_in_step(problem, state, 1e-2));
+    const std::vector<Vec3> elastic = forces_in_step(problem, state, 0);
+    for (std::size_t e = 0; e < elastic.size(); ++e) found.back()[e] -= elastic[e];
+  }
+  EXPECT_LT(largest_difference(found[0], found[1]), 1e-8 * largest(found[0]));
+}
+
 // Of some cells thrice as long: as if they damped twice once more by themselves, the others broken.
 TEST_P(KernelOf, DampingOfEditedCells) {
   Body body = rough_body({9, 7, 5}, Vec3::Constant(0.01)), others = body;
