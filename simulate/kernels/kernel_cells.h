@@ -55,20 +55,36 @@ FLEXEL_INLINE Gradient gradient_of(const Modes modes[3], const CellConstants& k,
       });
 }
 
-// Adds the viscous stress [Pa] to `stress`; sets `spin_free`, the forces of the hourglass modes [N].
-FLEXEL_INLINE void add_damping(const Gradient& g, const Modes u[3], const Modes v[3], const CellConstants& k,
-                               Matrix& stress, Lanes spin_free[4][3]) {
-  Matrix rate, strain_rate;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) rate.at[i][j] = v[i].d[j] * (0.25 / k.spacing[j]);
-  // A = sym(F^T dF/dt), F^T dF/dt = dF/dt + H^T dF/dt
-  Matrix product;
+// 2 A, A = sym(F^T dF/dt), F^T dF/dt = dF/dt + H^T dF/dt. `rate`: dF/dt.
+FLEXEL_INLINE Matrix twice_strain_rate(const Gradient& g, const Matrix& rate) {
+  Matrix product, sum;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
       product.at[i][j] = rate.at[i][j] + (g.h.at[0][i] * rate.at[0][j] + g.h.at[1][i] * rate.at[1][j] +
                                           g.h.at[2][i] * rate.at[2][j]);
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) strain_rate.at[i][j] = product.at[i][j] + product.at[j][i];  // 2 A
+    for (int j = 0; j < 3; ++j) sum.at[i][j] = product.at[i][j] + product.at[j][i];
+  return sum;
+}
+
+// Adds the viscous stress [Pa] of the rate of the volume. `rate`: dF/dt.
+FLEXEL_INLINE void add_swelling(const Gradient& g, const Matrix& rate, const CellConstants& k,
+                                Matrix& stress) {
+  Lanes swelling = {};  // dJ/dt
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) swelling += g.cofactor.at[i][j] * rate.at[i][j];
+  const Lanes pressure = (k.damping * (k.lambda + 2 * k.mu / 3)) * swelling;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) stress.at[i][j] += pressure * g.cofactor.at[i][j];
+}
+
+// Adds the viscous stress [Pa] to `stress`; sets `spin_free`, the forces of the hourglass modes [N].
+FLEXEL_INLINE void add_damping(const Gradient& g, const Modes u[3], const Modes v[3], const CellConstants& k,
+                               Matrix& stress, Lanes spin_free[4][3]) {
+  Matrix rate;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) rate.at[i][j] = v[i].d[j] * (0.25 / k.spacing[j]);
+  const Matrix strain_rate = twice_strain_rate(g, rate);
   const Lanes mean =
       (k.damping * k.mu / 3) * (strain_rate.at[0][0] + strain_rate.at[1][1] + strain_rate.at[2][2]);
   Matrix s;
@@ -82,12 +98,7 @@ FLEXEL_INLINE void add_damping(const Gradient& g, const Modes u[3], const Modes 
     stress_at_rest_of_law(k.law, half, made);
     s = made;
   } else {
-    Lanes swelling = {};  // dJ/dt
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) swelling += g.cofactor.at[i][j] * rate.at[i][j];
-    const Lanes pressure = (k.damping * (k.lambda + 2 * k.mu / 3)) * swelling;
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) stress.at[i][j] += pressure * g.cofactor.at[i][j];
+    add_swelling(g, rate, k, stress);
   }
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
