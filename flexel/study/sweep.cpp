@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ranges>
+#include <span>
 
 #include "base/units.h"
 #include "flexel/study/accuracy_analysis.h"
@@ -150,9 +150,10 @@ std::optional<std::size_t> Sweep::middle() const {
 // What changes the time or the last digits only.
 void Sweep::add_switches(std::vector<Trial>& trials, std::size_t r) const {
   const Rung& rung = rungs_[r];
-  for (const mapping::MapMethod row : mapping::map_methods() | std::views::reverse) {  // the default last
-    const std::string method = name_of(row);
-    if (method == first_.method || row == &mapping::kShapeFunctions) continue;
+  const std::span<const mapping::MapMethod> methods = mapping::map_methods();
+  for (auto row = methods.rbegin(); row != methods.rend(); ++row) {  // the default last
+    const std::string method = name_of(*row);
+    if (method == first_.method || *row == &mapping::kShapeFunctions) continue;
     Configuration each = first_;
     each.method = method;
     trials.push_back(trial("mapping", method, rung.size, each));

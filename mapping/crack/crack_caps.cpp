@@ -85,17 +85,17 @@ void CrackEdges::make_stretches(CrackMesh& mesh, std::size_t number) {
   const std::size_t line = static_cast<std::size_t>(
       std::lower_bound(lines_.begin(), lines_.end(), Line{place[0], place[1], place[2]}) - lines_.begin());
   const double low = boxes.plane(along, place[3] - 1), high = boxes.plane(along, place[3]);
+  std::array<int, 3> planes{};
+  planes[p] = place[1];
+  planes[q] = place[2];
   const auto corner = [&](int plane_along) {
-    std::array<int, 3> plane{};
-    plane[along] = plane_along;
-    plane[p] = place[1];
-    plane[q] = place[2];
+    planes[along] = plane_along;
     const auto pack = [](int i) { return static_cast<std::uint64_t>(i + (1 << 20)); };
-    const std::uint64_t key = pack(plane[2]) << 42 | pack(plane[1]) << 21 | pack(plane[0]);
+    const std::uint64_t key = pack(planes[2]) << 42 | pack(planes[1]) << 21 | pack(planes[0]);
     const auto known = corner_.find(key);
     if (known != corner_.end()) return known->second;
-    const Vec3 u(boxes.plane(0, plane[0]), boxes.plane(1, plane[1]), boxes.plane(2, plane[2]));
-    return corner_[key] = mesh.add_node(u, plane);
+    const Vec3 u(boxes.plane(0, planes[0]), boxes.plane(1, planes[1]), boxes.plane(2, planes[2]));
+    return corner_[key] = mesh.add_node(u, planes);
   };
   bool inside = false;
   std::vector<std::uint32_t> ends;

@@ -316,8 +316,8 @@ void PieceBuilder::fill_columns() {
   };
   for (const auto& [name, column] : body_.surface.vertex_columns) {
     Column& to = result_.surface.vertex_columns[name] = column;
-    const auto at = [&](std::uint32_t v, int c) {
-      return column.values[v * static_cast<std::size_t>(column.components) + static_cast<std::size_t>(c)];
+    const auto at = [&from = column](std::uint32_t v, int c) {
+      return from.values[v * static_cast<std::size_t>(from.components) + static_cast<std::size_t>(c)];
     };
     std::vector<double> means;
     for (int c = 0; c < column.components; ++c) means.push_back(mean(column, c));
