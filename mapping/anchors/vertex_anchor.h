@@ -5,8 +5,8 @@
 namespace flexel::mapping {
 
 // The element (or cell corner) that becomes the origin of the vertex's frame, and the octant around it that
-// the vertex is in. Vertices with equal anchors share one frame.
-struct VertexAnchor {
+// the vertex is in. Vertices with equal anchors share one frame. Aligned so that threads can store it at once.
+struct alignas(8) VertexAnchor {
   std::uint32_t owner = 0;  // cell or element
   bool in_cell = false;
   // Of a cell: its corner a = i + 2 j + 4 k. Of an element: bit 0, 1, 2 set on its high side along x, y, z.
