@@ -23,6 +23,7 @@
 
 #include "base/error.h"
 #include "base/files/memory_file.h"
+#include "base/program/address_sanitizer.h"
 #include "base/parallel.h"
 #include "base/stop.h"
 
@@ -57,7 +58,7 @@ void lower_limit(decltype(RLIMIT_DATA) resource, double value) {
 void set_limits(const ChildLimits& limits) {
   // The parent watches the memory in use. OpenCASCADE, for one, goes on without a face for which there was none, so that
   // no allocation is to fail but one of a size that is absurd, or one that the parent sees too late.
-#ifndef __SANITIZE_ADDRESS__  // its shadow is more than any limit
+#ifndef FLEXEL_ADDRESS_SANITIZER  // its shadow is more than any limit
   if (const double used = memory_in_use("self").writable; used > 0)
     lower_limit(RLIMIT_DATA, used + 2 * limits.memory + 1e9);
 #endif

@@ -73,8 +73,9 @@ Tree::Tree(const PointMasses& points, double opening) : points_(points), opening
 void Tree::sort() {
   NodeBox box;
   for (const Vec3& point : points_.position) box.add(point);
-  const double side = std::max((box.high - box.low).maxCoeff(), std::numeric_limits<double>::min());
-  const double scale = static_cast<double>((1 << kDepth) - 1) / side;
+  const double cells = (1 << kDepth) - 1;
+  const double side = std::max((box.high - box.low).maxCoeff(), cells * std::numeric_limits<double>::min());
+  const double scale = cells / side;  // finite, all at one place too
   keyed_.resize(points_.position.size());
   parallel_for_each(keyed_.size(), [&](std::size_t i) {
     std::uint64_t key = 0;

@@ -13,6 +13,7 @@
 #include <cstring>
 #include <random>
 
+#include "base/program/address_sanitizer.h"
 #include "tests/fuzz/trial.h"
 
 namespace flexel::fuzz {
@@ -130,7 +131,7 @@ Arguments parse(int argc, char** argv) {
 }
 
 void limit_address_space() {
-#ifndef __SANITIZE_ADDRESS__  // which needs terabytes of it
+#ifndef FLEXEL_ADDRESS_SANITIZER  // which needs terabytes of it
   const rlimit limit{kAddressSpace, kAddressSpace};
   setrlimit(RLIMIT_AS, &limit);
 #endif
