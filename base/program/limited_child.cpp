@@ -23,8 +23,8 @@
 
 #include "base/error.h"
 #include "base/files/memory_file.h"
-#include "base/program/address_sanitizer.h"
 #include "base/parallel.h"
+#include "base/program/address_sanitizer.h"
 #include "base/stop.h"
 
 namespace flexel {
