@@ -2,7 +2,7 @@
 // depends on n only, and reductions add the chunks' sums in order. Every chunk begins with check_stop()
 // (base/stop.h), so each function may throw Interrupted and TimeoutError.
 //
-// oneTBB is in parallel.cpp and parallel_sort.h alone: compiled into each loop it took a fifth of a second a loop.
+// oneTBB is in parallel.cpp and math/parallel_sort.h alone: compiled into each loop it took a fifth of a second a loop.
 #pragma once
 #include <algorithm>
 #include <cstddef>
