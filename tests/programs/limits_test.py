@@ -4,7 +4,6 @@ import os
 import re
 import resource
 import subprocess
-import time
 import zipfile
 
 from harness import BIN, SCENE, SOURCE, binary_stl, body, box, box_triangles, bracket, expect, expect_error, expect_ok, expect_only, main, run, scene, shell, write
@@ -135,7 +134,7 @@ def test_a_sound_cad_file_is_not_called_damaged():
 
 
 def test_time():
-    """Within a second, on a machine that does much else within three."""
+    """A program stops soon: by processor time, for a disk may stall; the clock only catches what hangs."""
     box()
     scene(text=SCENE + "[run]\nload_steps = 10000\n")
     expect_ok(run("flexel-voxelize", "box.stl", "--size", "0.5 mm", "--quiet", "-o", "body.vtu"))
@@ -147,13 +146,14 @@ def test_time():
                     ["flexel", "picture", "many.3mf", "-o", "o.png"], ["flexel", "export", "box.stl", "--scene", "scene.toml", "--size", "0.15 mm", "--calculix", "-o", "o.inp"],
                     ["flexel", "study", "box.stl", "--scene", "scene.toml", "--budget", "60 s", "-o", "s"],
                     ["flexel", "measure", "--model", "cells", "--size", "1 mm", "--material", "steel"]):
-        began = time.monotonic()
+        before_run = resource.getrusage(resource.RUSAGE_CHILDREN)
         result = run(*command, "--timeout", "0.5 s", timeout=60)
-        took = time.monotonic() - began
-        if result.code == 0 and took < 0.5:
-            continue  # too quick to be stopped
+        after_run = resource.getrusage(resource.RUSAGE_CHILDREN)
+        took = after_run.ru_utime - before_run.ru_utime + after_run.ru_stime - before_run.ru_stime
+        expect(took < 0.5 * (os.cpu_count() or 1) + 3, f"{command}: {took:.1f} s of processor time")
+        if result.code == 0 and command[1] == "measure":
+            continue  # it may be done before
         expect_error(result, command[0], "stopped by --timeout", code=5)
-        expect(took < 0.5 + 3, f"{command}: {took:.1f} s")
         for name in set(os.listdir(".")) - set(before):
             expect(name == "o.failed.vtu" or (name == "s" and os.path.isdir("s")), f"{command} leaves {name}")
 
