@@ -1,3 +1,4 @@
+// Eigen's solver of symmetric matrices for each size that occurs.
 #include "base/math/eigenvalues.h"
 
 namespace Eigen {
