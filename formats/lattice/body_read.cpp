@@ -14,6 +14,7 @@
 #include "formats/lattice/body_file_names.h"
 #include "formats/lattice/body_metadata.h"
 #include "formats/lattice/cell_moments.h"
+#include "formats/lattice/change_columns.h"
 #include "formats/vtu/vtu.h"
 
 namespace flexel {
@@ -98,20 +99,6 @@ void read_surface(const vtu::File& file, const Metadata& metadata, Body& body) {
   read_surface_columns(file, names::surface_polygon_columns, surface.polygon_columns);
 }
 
-// Of cells, of elements or of both (docs/reference/body-file.md); other programs may have other columns that end so.
-constexpr const char* kFactors[] = {"stiffness_change",
-                                    "damping_change",
-                                    "density_change",
-                                    "strength_change",
-                                    "yield_change",
-                                    "friction_change",
-                                    "radius_change",
-                                    "stick_change",
-                                    "connection_stiffness_change",
-                                    "connection_damping_change",
-                                    "connection_strength_change",
-                                    "connection_friction_change"};
-
 void read_columns(const vtu::File& file, Section section, std::size_t count, Columns& columns) {
   for (const std::string& name : file.names(section)) {
     if (names::reserved(name, section)) continue;
@@ -122,7 +109,8 @@ void read_columns(const vtu::File& file, Section section, std::size_t count, Col
     column.values = file.read_flat(section, name);
     const std::size_t values = count * file.components(section, name);
     // A factor that another program gave the vertices of centre-placed parts would be lost without a word.
-    if (std::find(std::begin(kFactors), std::end(kFactors), name) != std::end(kFactors) &&
+    if (std::any_of(kChangeColumns.begin(), kChangeColumns.end(),
+                    [&](const ChangeColumn& change) { return change.name == name; }) &&
         values < column.values.size() &&
         std::any_of(column.values.begin() + static_cast<std::ptrdiff_t>(values), column.values.end(),
                     [](double value) { return value != 0; }))

@@ -7,11 +7,13 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <string_view>
 
 #include "base/error.h"
 #include "base/math/eigenvalues.h"
 #include "base/parallel.h"
 #include "base/units.h"
+#include "formats/lattice/change_columns.h"
 
 namespace flexel::simulate {
 namespace {
@@ -101,17 +103,16 @@ void refuse_at_cells(const Body& body, const char* name) {
 }
 
 void refuse_misplaced_columns(const Body& body) {
-  for (const char* column :
-       {"stiffness_change", "damping_change", "density_change", "strength_change", "yield_change"})
-    refuse_misplaced(body, column, "it is one of cells there, so write it into the cell data");
-  refuse_misplaced(body, "radius_change", "they have no radius");
-  for (const char* column : {"connection_stiffness_change", "connection_damping_change",
-                             "connection_strength_change", "connection_friction_change"})
-    refuse_misplaced(body, column, "only connections of model \"paper\" have factors of their own");
-  for (const char* column :
-       {"friction_change", "radius_change", "stick_change", "connection_stiffness_change",
-        "connection_damping_change", "connection_strength_change", "connection_friction_change"})
-    refuse_at_cells(body, column);
+  for (const auto& [name, of] : kChangeColumns) {
+    if (of == ChangeOf::matter) {
+      refuse_misplaced(body, name, "it is one of cells there, so write it into the cell data");
+      continue;
+    }
+    if (of == ChangeOf::radius) refuse_misplaced(body, name, "they have no radius");
+    if (of == ChangeOf::connections)
+      refuse_misplaced(body, name, "only connections of model \"paper\" have factors of their own");
+    refuse_at_cells(body, name);
+  }
 }
 
 }  // namespace
@@ -160,16 +161,18 @@ double RestShapes::of_connection(std::uint32_t element, std::size_t bit) const {
 
 void refuse_damaged_columns(const Body& body) {
   (void)RestShapes(body);
-  for (const char* column : {"stiffness_change", "damping_change", "density_change", "strength_change",
-                             "yield_change", "friction_change", "radius_change"}) {
-    (void)element_factors(body, column);
-    (void)cell_factors(body, column);
+  for (const auto& [name, of] : kChangeColumns) {
+    if (of == ChangeOf::connections) {
+      (void)connection_values(body, name);
+    } else if (std::string_view(name) == "stick_change") {  // an absolute value
+      (void)element_values(body, name);
+    } else {
+      (void)element_factors(body, name);
+      (void)cell_factors(body, name);
+    }
   }
-  for (const char* column : {"plastic_strain", "stick_change"}) (void)element_values(body, column);
+  (void)element_values(body, "plastic_strain");
   (void)column_of(body.element_columns, "settled", 3);
-  for (const char* column : {"connection_stiffness_change", "connection_damping_change",
-                             "connection_strength_change", "connection_friction_change"})
-    (void)connection_values(body, column);
   refuse_misplaced_columns(body);
 }
 
