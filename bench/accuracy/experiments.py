@@ -369,8 +369,10 @@ def plot(path, title, across, unit, curves):
         drawing.append(f"$d{k} using 1:2 with points linecolor {k + 1} pointtype 6 title '{name}, measured'")
         if any(ours is not None for *_, ours in points):
             drawing.append(f"$d{k} using 1:3 with lines linecolor {k + 1} title '{name}, Flexel'")
+    top = 1.5 * max(value for points in curves.values() for _, value, _ in points)  # a curve that runs away leaves the others to be seen
+    cut = f"set yrange [:{top!r}]\n" if any(ours is not None and ours > top for points in curves.values() for *_, ours in points) else ""
     script = (f"set terminal svg size 720,420 background 'white'\nset output '{path}'\nset grid\nset key outside right\nset title \"{title}\"\n"
-              f"set xlabel '{across}'\nset ylabel '{unit}'\n{''.join(blocks)}plot {', '.join(drawing)}\n")
+              f"set xlabel '{across}'\nset ylabel '{unit}'\n{cut}{''.join(blocks)}plot {', '.join(drawing)}\n")
     subprocess.run(["gnuplot"], input=script, text=True, check=True)
     return f"![{title}]({path.parent.name}/{path.name})\n\n"
 
