@@ -720,7 +720,7 @@ std::optional<FlexAnswer> flex_answer(const SolvedRun& run, const Plan& plan,
   if (report.lattice_volume_before > 0)
     answer.volume_change = report.lattice_volume_after / report.lattice_volume_before - 1;
   const std::string missed = flex_warning(*plan.job.flex, answer);
-  if (!missed.empty()) progress.warn(missed);
+  if (!missed.empty() && !flex_failed(*plan.job.flex, answer)) progress.warn(missed);
   return answer;
 }
 
@@ -841,6 +841,8 @@ Deformed run_stages(const DeformArguments& arguments, Plan& plan, Progress& prog
   for (const std::string& line : lines) progress.say(line);
   if (arguments.json) write_text(summary, "-");
   if (missing) throw *missing;
+  if (flexed && flex_failed(*plan.job.flex, *flexed))
+    throw InvalidMappingError(flex_warning(*plan.job.flex, *flexed) + "; what came of it is written");
   return result;
 }
 

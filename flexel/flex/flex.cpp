@@ -15,8 +15,8 @@
 namespace flexel::commands {
 namespace {
 
-constexpr double kMostTurns = 4;  // in all: further on a part lies within itself
-constexpr double kMissed = 0.05;  // of the angle
+constexpr double kMostTurns = 4;                 // in all: further on a part lies within itself
+constexpr double kMissed = 0.05, kFailed = 0.5;  // of the angle
 constexpr double kDegrees = 180 / std::numbers::pi;
 
 double parse_flex_angle(const std::string& text, const char* option) {
@@ -174,10 +174,14 @@ double measure_flex(const Flex& flex, const Body& body, const std::vector<Vec3>&
   return turned + whole * std::round((flex.angle - turned) / whole);
 }
 
+bool flex_failed(const Flex& flex, const FlexAnswer& answer) {
+  return std::abs(answer.angle - flex.angle) > kFailed * std::abs(flex.angle);
+}
+
 std::string flex_warning(const Flex& flex, const FlexAnswer& answer) {
   if (std::abs(answer.angle - flex.angle) < kMissed * std::abs(flex.angle)) return "";
   return fmt::format(
-      "the ends have turned by {:.2f} deg only, not by {:.2f} deg: the part reaches an end with an edge or a "
+      "the ends have turned by {:.2f} deg, not by {:.2f} deg: the part reaches an end with an edge or a "
       "tip, or its cells are too large there, and it gives way; use a smaller --size, choose the ends with "
       "--along, or lead whole faces with flexel deform --fix and --twist",
       kDegrees * answer.angle, kDegrees * flex.angle);

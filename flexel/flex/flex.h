@@ -50,8 +50,10 @@ struct FlexAnswer {
   double angle = 0;                     // rad, measured
   std::optional<double> volume_change;  // share, of the matter; nothing where it has no cells
 };
-// A warning where the ends miss the angle that is asked for by 5 % of it and more; else empty.
+// What to say where the ends miss the angle that is asked for by 5 % of it and more; else empty.
 [[nodiscard]] std::string flex_warning(const Flex& flex, const FlexAnswer& answer);
+// Whether they miss it by half of it and more: then the command has not done what it was asked for.
+[[nodiscard]] bool flex_failed(const Flex& flex, const FlexAnswer& answer);
 [[nodiscard]] std::string flex_line(const Flex& flex, const FlexAnswer& answer);
 
 }  // namespace flexel::commands

@@ -64,7 +64,17 @@ def test_an_end_that_gives_way_is_told():
     done = expect_ok(run("flexel", "flex", PARTS / "ballA.off", "--bend", "20 deg", "--material", "rubber", "--count", "1500", "--no-estimate", "--summary", "s.json", "-o", "bent.stl"))
     told = math.degrees(json.loads(pathlib.Path("s.json").read_text())["flex"]["angle"])
     expect(told < 19, told)
-    expect(f"the ends have turned by {told:.2f} deg only, not by 20.00 deg" in done.err, done.err)
+    expect(f"the ends have turned by {told:.2f} deg, not by 20.00 deg" in done.err, done.err)
+
+
+def test_ends_that_turn_by_less_than_half_are_a_failure():
+    """A bar at 45 degrees reaches its ends with edges. What came of it is there all the same."""
+    at = lambda x, y, z: ((x - y) * math.sqrt(0.5), (x + y) * math.sqrt(0.5), z)
+    triangles = [[at(*corner) for corner in triangle] for triangle in box_triangles((100.0, 10.0, 10.0))]
+    pathlib.Path("askew.stl").write_bytes(ascii_stl(triangles))
+    done = run("flexel", "flex", "askew.stl", "--twist", "30 deg", "--material", "PLA", "--count", "2000", "--no-estimate", "-o", "twisted.stl")
+    expect_error(done, "flexel", "the ends have turned by ", "not by 30.00 deg", code=4)
+    expect(len(vertices("askew.stl")) > 0 and pathlib.Path("twisted.stl").stat().st_size > 0, "it is written")
 
 
 def test_what_cannot_be_is_one_line():
