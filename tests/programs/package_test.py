@@ -9,7 +9,7 @@ import sys
 from harness import BIN, SOURCE, Skip, box, expect, expect_ok, main, need, run, shell
 
 # Linked as shared libraries with interfaces of C, or tools: their packages carry their own licences.
-NOT_COMPILED_IN = {"build-essential", "cmake", "ninja-build", "zlib1g-dev", "libpng-dev", "libfreetype-dev", "libmicrohttpd-dev", "gnuplot-nox",
+NOT_COMPILED_IN = {"build-essential", "cmake", "ninja-build", "zlib1g-dev", "libpng-dev", "libfreetype-dev", "libfontconfig-dev", "libmicrohttpd-dev", "gnuplot-nox",
                    "python3-dev", "python3-numpy", "file", "python3"}
 
 
