@@ -31,7 +31,7 @@ class ClaySession {
 
   // 200 and {"line": poses taken so far}; 400: no message; 409: another client holds the tool; 429: too many wait.
   [[nodiscard]] Answer act(const std::string& message);
-  // A file: "part.stl" (or another format), "scene.toml", "scene-1.toml" ..., "rest.vtu". Waits until the part is at rest.
+  // A file: "part.stl" (or another format), "scene.toml", "scene-1.toml" ..., "rest.vtu", "surface-3". Waits until the part is at rest.
   // 404: no such file; 500: why it cannot be written.
   [[nodiscard]] Answer save(const std::string& name);
   // Readers of frames come with the name of their client, and go.
@@ -56,6 +56,8 @@ class ClaySession {
   void change(const Act& act);
   void grab(const Act& act, ClayDocument& next) const;
   void keep(ClayDocument& next) const;
+  void paint(const Act& act, ClayDocument& next) const;
+  void alter(const Act& act, ClayDocument& next) const;
   void take_up(ClayDocument next);
   void travel(bool back);
   void lead();
