@@ -1,9 +1,12 @@
 // All changes happen anew each time, as in a run of the scene: glue is as stiff as the material is now.
 #include "flexel/clay/changed_body.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <numeric>
 
+#include "base/error.h"
 #include "flexel/view/page.h"
 #include "flexel/view/view_file.h"
 #include "simulate/scene/scene.h"
@@ -43,7 +46,12 @@ void apply_changes(ClayDocument& document, const std::string& base) {
 }
 
 std::string surface_pack(const NumberedBody& body) {
-  view::ViewFile file = view::make_live_file(*body.body, "");
+  view::ViewFile file;
+  try {
+    file = view::make_live_file(*body.body, "");
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("carve: what is left cannot be closed ({})", error.what()));
+  }
   for (std::uint32_t& carrier : file.surface->carriers) carrier = (*body.element)[carrier];
   const Bytes bytes = view::pack_file(file);
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
