@@ -72,13 +72,12 @@ class Browser:
         self.mouse(("move", x, y), ("down",), ("move", x + dx / 2, y + dy / 2), ("move", x + dx, y + dy), ("up",))
 
     def touch(self, *fingers, kind="touch"):
-        """Each finger (or "pen") goes along its places (x, y) or (x, y, pressure), all at once."""
+        """Each finger (or "pen") goes along its places (x, y), all at once."""
         inputs = []
         for k, places in enumerate(fingers):
-            moves = [{"type": "pointerMove", "duration": 20, "x": round(x), "y": round(y), **({"pressure": pressure[0]} if pressure else {})}
-                     for x, y, *pressure in places]
+            moves = [{"type": "pointerMove", "duration": 20, "x": round(x), "y": round(y)} for x, y in places]
             inputs.append({"type": "pointer", "id": f"{kind}{k}", "parameters": {"pointerType": kind},
-                           "actions": [moves[0], {"type": "pointerDown", "button": 0, **{key: moves[0][key] for key in moves[0] if key == "pressure"}}, *moves[1:], {"type": "pointerUp", "button": 0}]})
+                           "actions": [moves[0], {"type": "pointerDown", "button": 0}, *moves[1:], {"type": "pointerUp", "button": 0}]})
         self.ask("POST", "/actions", {"actions": inputs})
 
     def keys(self, text):
