@@ -197,6 +197,10 @@ def test_a_ball_is_carved_out_by_a_click_and_by_keys():
         settle(browser)
         expect(expect_drawn_as_saved(browser, url)[0] < whole - 100, "carved by keys")
         expect(b"centre = [\"0.04" in saved(url, "scene.toml"), "where the numbers say")
+        drawn = expect_drawn_as_saved(browser, url)
+        browser.open(url.geturl())  # a page that comes later
+        browser.wait("flexelView.clay.frame?.surface")
+        expect(expect_drawn_as_saved(browser, url) == drawn, "a page that comes later draws the same")
         # what was carved has no face to hold
         choose_hand(browser, "hold")
         browser.run("flexelView.clay.toggleHold('bracket/carved')")

@@ -264,9 +264,9 @@ export class Clay {
         if (!answer.ok && number !== this.frame.surface) continue;
         if (!answer.ok) throw new Error(await answer.text());
         this.panel.replaceSurface(await unpack(new Uint8Array(await answer.arrayBuffer())));
+        this.shape = this.panel.shape;
         this.surface = number;
       }
-      this.shape = this.panel.shape;
       this.controls.probes.clear();
       this.panel.setInk(this.picture.state.theme);
       this.facePlaces = this.placesOfFaces();
