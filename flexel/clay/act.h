@@ -18,7 +18,7 @@ struct Act {
     release,  // the last tool lets go
     keep,     // the present shape becomes the rest shape
     carve,    // what rests in a ball goes
-    glue,     // parts of which something rests in a ball are held together where they are near
+    glue,     // parts are held together where they are near, in a ball
     undo,
     redo,
     material,

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 
 #include "base/error.h"
 #include "simulate/scene/scene.h"
@@ -39,7 +40,22 @@ std::string kept_text(std::string text) {
   return text + "\n[run]\n" + keep;
 }
 
+// Of all their bodies; a body that several have counts once.
+std::size_t elements_of(const std::vector<ClayDocument>& documents) {
+  std::set<const Body*> bodies;
+  std::size_t count = 0;
+  for (const ClayDocument& document : documents)
+    for (const Body* body : {document.start.body.get(), document.now.body.get()})
+      if (body != nullptr && bodies.insert(body).second) count += body->element_count();
+  return count;
+}
+
 }  // namespace
+
+void forget_oldest(std::vector<ClayDocument>& undo, std::size_t most, std::size_t most_elements) {
+  while (undo.size() > 1 && (undo.size() > most || elements_of(undo) > most_elements))
+    undo.erase(undo.begin());
+}
 
 std::string where_of_name(const std::string& name) {
   std::string text = "\"";

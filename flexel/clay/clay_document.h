@@ -45,6 +45,9 @@ struct ClayDocument {
 // Throws InputError(name, ...): a base that is no scene, or that scene_text makes none of, holds, tools and all.
 void refuse_unkept(const std::string& base, const std::string& name);
 
+// Drops the oldest, but not the last one, while there are more than `most`, or their bodies have more elements.
+void forget_oldest(std::vector<ClayDocument>& undo, std::size_t most, std::size_t most_elements);
+
 // TOML of a name; of a ball.
 [[nodiscard]] std::string where_of_name(const std::string& name);
 [[nodiscard]] std::string where_of_ball(const Vec3& centre, double radius);

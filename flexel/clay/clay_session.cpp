@@ -32,6 +32,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMostWaiting = 256, kMostHolds = 64, kMostTools = 16, kMostUndo = 100,
                       kMostChanges = 64;
+constexpr std::size_t kMostUndoElements = 5'000'000;  // some 200 bytes each
 constexpr double kDragTolerance = 1e-4, kTolerance = 1e-8;
 constexpr int kDragIterations = 12, kIterations = 40, kMostHalvings = 6;
 constexpr double kSpring = 10;     // times the part's stiffness
@@ -270,7 +271,7 @@ void ClaySession::perform(const Act& act) {
 
 void ClaySession::remember() {
   undo_.push_back(document_);
-  if (undo_.size() > kMostUndo) undo_.erase(undo_.begin());
+  forget_oldest(undo_, kMostUndo, kMostUndoElements);
   redo_.clear();
 }
 
@@ -303,7 +304,12 @@ void ClaySession::change(const Act& act) {
     if (!next.changes.empty()) apply_changes(next, base_);  // glue is as stiff as what it holds
   }
   ClayDocument before = document_;
-  take_up(std::move(next));
+  try {
+    take_up(std::move(next));
+  } catch (const InputError& error) {
+    if (act.kind != Act::Kind::carve) throw;
+    throw InputError(fmt::format("carve: what is left is not held and led as before ({})", error.what()));
+  }
   std::swap(before, document_);
   remember();
   document_ = std::move(before);
@@ -347,7 +353,7 @@ void ClaySession::paint(const Act& act, ClayDocument& next) const {
 
 void ClaySession::alter(const Act& act, ClayDocument& next) const {
   if (next.changes.size() == kMostChanges)
-    throw InputError("64 places were carved or glued: keep the shape before the next");
+    throw InputError("64 places were carved or glued: hold the part, and keep its shape before the next");
   next.changes.push_back(change_text(act));
   apply_changes(next, base_);
   if (act.kind != Act::Kind::carve) return;
@@ -356,7 +362,7 @@ void ClaySession::alter(const Act& act, ClayDocument& next) const {
 }
 
 void ClaySession::keep(ClayDocument& next) const {
-  if (!model_) throw InputError("nothing has changed since the shape was kept");
+  if (!model_) throw InputError("nothing acts on the part: hold a face before its shape is kept");
   const std::vector<ToolPose> poses = model_->poses();
   if (!model_->lead(poses, kTolerance, kIterations, [] { check_stop(); }))
     throw InputError("the part is not at rest: its shape cannot be kept");
@@ -537,6 +543,7 @@ void ClaySession::publish() {
     const std::lock_guard lock(mutex_);
     frame = head(positions.size());
     silent = head(0);
+    surface_ = {document_.surface_number, document_.surface};
   }
   ++frame_;
   frame += positions;
@@ -557,7 +564,17 @@ Answer ClaySession::mapped(const std::string& name, const Body& body) const {
   return {200, file_text(out)};
 }
 
+// What the page draws with does not wait for the part to come to rest.
+std::optional<Answer> ClaySession::drawn(const std::string& name) {
+  if (name == "rest.f32") return Answer{200, single_precision(first_->rest)};
+  const std::lock_guard lock(mutex_);
+  if (!surface_.second || name != fmt::format("surface-{}", surface_.first)) return std::nullopt;
+  return Answer{200, *surface_.second};
+}
+
 Answer ClaySession::save(const std::string& name) {
+  if (std::optional<Answer> now = drawn(name)) return *std::move(now);
+  if (name.starts_with("surface-")) return {404, "the part has another surface\n"};
   ClayDocument document;
   {
     std::unique_lock lock(mutex_);
@@ -566,9 +583,6 @@ Answer ClaySession::save(const std::string& name) {
     document = shown_;
   }
   try {
-    if (name == "rest.f32") return {200, single_precision(first_->rest)};
-    if (document.surface && name == fmt::format("surface-{}", document.surface_number))
-      return {200, *document.surface};
     if (name == "rest.vtu" || name == "body.vtu")
       return {200, bytes_of(name == "rest.vtu" ? *first_ : bent(document))};
     for (const char* format : kFormats)

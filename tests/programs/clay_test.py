@@ -244,9 +244,35 @@ def test_carving_is_that_of_the_saved_scene():
         frame = hand.act("0 " + " ".join(str(x + d) for x, d in zip(base, [0, 0.001, 0, 0, 0, 0])))
         expect(not frame["said"] and len(gone(frame)) > len(gone(carved)), f"{frame['said']}")
         expect_same_run(url, frame, ("--crack", "cap"))
-        for lines, said in ((["carve at 1 1 1 0.001"], "no element"), (["carve at 0.04 0.02 0.03 1"], "leaves nothing"), (["glue at 0.04 0.02 0.003 0.01 0.001"], "fuse")):
+        for lines, said in ((["carve at 1 1 1 0.001"], "no element"), (["carve at 0.04 0.02 0.03 1"], "leaves nothing"), (["carve at 0.08 0.02 0.003 0.025"], "is not held and led as before"), (["glue at 0.04 0.02 0.003 0.01 0.001"], "fuse")):
             frame = hand.act(*lines)
             expect(said in frame["said"] and frame["undo"], f"{lines}: {frame['said']!r}")
+
+
+def test_a_page_gets_the_surface_while_a_hand_drags():
+    bracket()
+    with clay("bracket.step", "--size", "4 mm") as (url, _):
+        hand = Hand(url, 16 * "a")
+        expect("hold a face" in hand.act("carve at 0.04 0.02 0.006 0.009", "keep")["said"], f"nothing holds it: {hand.last['said']}")
+        surface = hand.act("hold bracket/1", "grab face bracket/2")["surface"]
+        enough, statuses = threading.Event(), []
+
+        def drag():
+            for k in range(100000):
+                if enough.is_set():
+                    return
+                statuses.append(hand.post(f"hand 0 0 {-0.001 - 0.0005 * (k % 4)}")[0])
+
+        thread = threading.Thread(target=drag)
+        thread.start()
+        try:
+            for name in (f"surface-{surface}", "rest.f32"):
+                expect(ask(url, f"{url.path}save/{name}")[0] == 200 and thread.is_alive(), f"{name} does not wait for a part at rest")
+        finally:
+            enough.set()
+            thread.join()
+        expect(set(statuses) <= {200, 429}, f"{set(statuses)}")
+        expect(not hand.act("stay", "keep")["said"], "held, it is kept")
 
 
 def test_glue_holds_parts_together_as_in_the_saved_scene():

@@ -179,10 +179,12 @@ export class Clay {
     if (this.mode === "hold") return name.odd ? this.say(`${name.text} is no face that has a name`, "warning") : this.toggleHold(name.text);
     if (this.mode === "paint") return this.paint(this.panel.partName(this.shape.face[hit.triangle]));
     if (this.mode === "carve" || this.mode === "glue") return this.change(this.mode, rest);
+    const byFace = this.by("takes").value === "face";
+    if (byFace && name.odd) return this.say(`${name.text} is no face that has a name`, "warning");
     this.picture.canvas.setPointerCapture(event.pointerId);
     this.drag = {from: at, now: at, pointer: event.pointerId, mode: this.mode, grabs: this.frame.grabs, axes: this.picture.view.axes,
                  touch: event.pointerType === "touch", pen: event.pointerType === "pen", pressure: event.pressure, into: this.panel.normalOf(hit).negate()};
-    this.post(this.by("takes").value === "face" ? `grab face ${name.text}` : `grab at ${rest.join(" ")} ${this.radius}`);
+    this.post(byFace ? `grab face ${name.text}` : `grab at ${rest.join(" ")} ${this.radius}`);
   }
 
   move(event) {
@@ -262,6 +264,7 @@ export class Clay {
       for (let number; (number = this.frame.surface) !== this.surface; ) {
         const answer = await fetch(number === 0 ? "data/0" : `save/surface-${number}`);
         if (!answer.ok && number !== this.frame.surface) continue;
+        if (answer.status === 404) break;  // another has come; the frame that says so is on its way
         if (!answer.ok) throw new Error(await answer.text());
         this.panel.replaceSurface(await unpack(new Uint8Array(await answer.arrayBuffer())));
         this.shape = this.panel.shape;
@@ -346,7 +349,7 @@ export class Clay {
       this.by("undo").disabled = !frame.undo;
       this.by("redo").disabled = !frame.redo;
       for (const id of ["stay", "lead"]) this.by(id).disabled = frame.tools.length === 0;
-      this.by("keep").disabled = frame.tools.length === 0;
+      this.by("keep").disabled = frame.tools.length === 0 && frame.holds.length === 0;
     }
     this.by("held").textContent = frame.holds.length > 0 ? frame.holds.join(", ") : "nothing yet: click a face";
     if (frame.material) this.by("material").value = frame.material;
