@@ -46,8 +46,8 @@
 #include "simulate/thermal/free_strain.h"
 #include "simulate/thermal/temperature_column.h"
 #include "simulate/thermal/thermal.h"
+#include "simulate/time/before_equilibrium.h"
 #include "simulate/time/dynamic_relaxation.h"
-#include "simulate/time/time_segment.h"
 #include "simulate/time/timed_run.h"
 
 namespace flexel::simulate {
@@ -394,27 +394,6 @@ void drop_stuck_places(Body& body, const Scene& scene, Progress& progress) {
                     "[contact] they are apart",
                     scene.name, count));
   body.notes.erase(kStuckNote);
-}
-
-// The events of a scene without a time change the body as it comes, one after the other, before anything acts.
-void happen_before_equilibrium(Body& body, Scene scene, Progress& progress) {
-  for (const Event& event : scene.events)
-    if (event.prepare)
-      for (std::string& name : event.prepare()) scene.coming_parts.push_back(std::move(name));
-  State state = state_of(body);
-  SegmentStart start;
-  start.settled = settled_displacement(body);
-  start.fused = fused_points(body);
-  body.notes.erase(kFusedNote);  // events change start.fused and the numbers of elements
-  for (const Event& event : scene.events) {
-    const Problem problem = timed_problem(body, scene, start);
-    EventContext context{body, state, start.fused, start.settled, problem, progress};
-    const std::string what = event.apply(context);
-    progress.say(fmt::format("{}: {}", event.name, what));
-  }
-  set_fused_points(body, start.fused);
-  body.position.resize(body.element_count());
-  move_body(body, state);
 }
 
 void explain_memory(const Body& body, const Scene& scene, Progress& progress) {

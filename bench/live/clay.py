@@ -101,6 +101,14 @@ def pictures(folder):
         browser.screenshot(folder / "clay-pull.png")
         browser.mouse(("move", x, y), ("up",))
         settle(browser)
+        for place in ("0.035 0.012 0.006 0.007", "0.05 0.028 0.006 0.007", "0.065 0.012 0.006 0.007"):
+            browser.run("flexelView.clay.post(arguments[0])", f"carve at {place}")
+            time.sleep(1)
+            settle(browser)
+        browser.run("document.querySelector('input[name=hand][value=carve]').click()")
+        browser.wait("!flexelView.clay.renewing && flexelView.clay.surface === flexelView.clay.frame.surface && !flexelView.clay.asked")
+        time.sleep(1)
+        browser.screenshot(folder / "clay-carve.png")
     with clay("bracket.step", "--material", "rubber") as (url, _), chromium((1280, 900)) as browser:
         browser.open(url.geturl())
         for line in ("hold bracket/1", "grab face bracket/2", "0 0 0 0 0.9 0 0"):

@@ -74,6 +74,30 @@ Act grab_act(const std::string& rest, const std::string& place) {
   return act;
 }
 
+// "at X Y Z RADIUS", and for glue how near.
+Act ball_act(Act::Kind kind, const std::string& rest, const std::string& place) {
+  const bool glues = kind == Act::Kind::glue;
+  const std::vector<std::string> words = words_of(rest);
+  if (words.size() != (glues ? 6 : 5) || words[0] != "at")
+    throw InputError(place,
+                     glues ? "glue: give \"at X Y Z RADIUS WITHIN\"" : "carve: give \"at X Y Z RADIUS\"");
+  Act act{kind, "", {}};
+  act.at = vector(words, 1, kFarthest, place);
+  act.radius = number(words[4], kFarthest, place);
+  if (!(act.radius > 0)) throw InputError(place, "a ball has a radius above 0");
+  if (glues) act.within = number(words[5], kFarthest, place);
+  if (glues && !(act.within > 0)) throw InputError(place, "glue reaches farther than 0");
+  return act;
+}
+
+// A material has no blank here: "spring-steel" is spring steel.
+Act paint_act(const std::string& rest, const std::string& place) {
+  const std::size_t space = std::min(rest.find(' '), rest.size());
+  Act act{Act::Kind::paint, name_of(rest.substr(std::min(space + 1, rest.size())), place), {}};
+  act.material = name_of(rest.substr(0, space), place);
+  return act;
+}
+
 Act hand_act(const std::string& rest, const std::string& place) {
   const std::vector<std::string> words = words_of(rest);
   if (words.size() != 3 && words.size() != 6) throw InputError(place, "hand: give X Y Z, or X Y Z RX RY RZ");
@@ -96,8 +120,11 @@ Act parse_act(const std::string& line, const std::string& place) {
     return act;
   }
   if (word == "grab") return grab_act(rest, place);
+  if (word == "carve") return ball_act(Act::Kind::carve, rest, place);
+  if (word == "glue") return ball_act(Act::Kind::glue, rest, place);
   if (word == "hand") return hand_act(rest, place);
   if (word == "material") return {Act::Kind::material, name_of(rest, place), {}};
+  if (word == "paint") return paint_act(rest, place);
   if (word == "stay") return plain(Act::Kind::stay);
   if (word == "release") return plain(Act::Kind::release);
   if (word == "keep") return plain(Act::Kind::keep);

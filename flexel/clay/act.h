@@ -17,17 +17,22 @@ struct Act {
     stay,     // the hand leaves, the tool stays where it is
     release,  // the last tool lets go
     keep,     // the present shape becomes the rest shape
+    carve,    // what rests in a ball goes
+    glue,     // parts are held together where they are near, in a ball
     undo,
     redo,
     material,
-    take  // the tool, from another hand
+    paint,  // a part gets a material of its own
+    take    // the tool, from another hand
   };
   Kind kind = Kind::pose;
-  std::string name;        // of a face or a material
-  ToolPose pose = {};      // pose, hand
-  Vec3 at = Vec3::Zero();  // m, rest: grab, where `name` is ""
-  double radius = 0;       // m, likewise
-  bool on = true;          // hold
+  std::string name;           // of a face, a material or a part
+  ToolPose pose = {};         // pose, hand
+  Vec3 at = Vec3::Zero();     // m, rest: carve, glue, and grab, where `name` is ""
+  double radius = 0;          // m, likewise
+  bool on = true;             // hold
+  double within = 0;          // m, glue: how near
+  std::string material = {};  // paint
 };
 
 // What one message says.

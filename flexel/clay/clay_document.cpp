@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 
 #include "base/error.h"
 #include "simulate/scene/scene.h"
@@ -39,7 +40,22 @@ std::string kept_text(std::string text) {
   return text + "\n[run]\n" + keep;
 }
 
+// Of all their bodies; a body that several have counts once.
+std::size_t elements_of(const std::vector<ClayDocument>& documents) {
+  std::set<const Body*> bodies;
+  std::size_t count = 0;
+  for (const ClayDocument& document : documents)
+    for (const Body* body : {document.start.body.get(), document.now.body.get()})
+      if (body != nullptr && bodies.insert(body).second) count += body->element_count();
+  return count;
+}
+
 }  // namespace
+
+void forget_oldest(std::vector<ClayDocument>& undo, std::size_t most, std::size_t most_elements) {
+  while (undo.size() > 1 && (undo.size() > most || elements_of(undo) > most_elements))
+    undo.erase(undo.begin());
+}
 
 std::string where_of_name(const std::string& name) {
   std::string text = "\"";
@@ -54,11 +70,22 @@ std::string where_of_ball(const Vec3& centre, double radius) {
   return fmt::format("{{ sphere = {{ centre = {}, radius = \"{:.17g} m\" }} }}", lengths(centre), radius);
 }
 
+std::string change_text(const Act& act) {
+  std::string text =
+      fmt::format("\n[[event]]\ndo = \"{}\"\npositions = \"rest\"\nwhere = {}\n",
+                  act.kind == Act::Kind::carve ? "carve" : "fuse", where_of_ball(act.at, act.radius));
+  if (act.kind == Act::Kind::glue) text += fmt::format("within = \"{:.17g} m\"\n", act.within);
+  return text;
+}
+
 std::string scene_text(const ClayDocument& document, const std::string& base, bool keep) {
   std::string text;
   if (!document.material.empty()) text += "material = " + where_of_name(document.material) + "\n";
   text += base;
   if (!text.empty() && text.back() != '\n') text += '\n';
+  for (const auto& [part, material] : document.painted)
+    text += fmt::format("\n[parts.{}]\nmaterial = {}\n", where_of_name(part), where_of_name(material));
+  for (const std::string& change : document.changes) text += change;
   for (const std::string& name : document.holds) text += "\n[[fix]]\nwhere = " + where_of_name(name) + "\n";
   for (std::size_t t = 0; t < document.tools.size(); ++t) text += move_of(document.tools[t], t + 1);
   return keep ? kept_text(std::move(text)) : text;
@@ -66,22 +93,25 @@ std::string scene_text(const ClayDocument& document, const std::string& base, bo
 
 void refuse_unkept(const std::string& base, const std::string& name) {
   const simulate::Scene scene = simulate::parse_scene(base, name);
-  if (scene.run.renormalise) return;  // refuse_unled tells why not
+  if (scene.run.renormalise || scene.run.time) return;  // refuse_unled tells why not
   ClayDocument document;
   if (scene.material.empty()) document.material = "PLA";
   document.holds = {"xmin"};
   document.tools.emplace_back().where = where_of_name("xmax");
+  Act carve{Act::Kind::carve, "", {}};
+  carve.radius = 1;
+  document.changes = {change_text(carve)};
+  document.painted["a part that hands paint"] = "PLA";
   std::string why = "\"renormalise\" is nowhere in its [run]";
   try {
     if (simulate::parse_scene(scene_text(document, base, true), "then").run.renormalise) return;
   } catch (const InputError& error) {
     why = fmt::format("{}: {}", error.where(), error.what());
   }
-  throw InputError(
-      name,
-      fmt::format("what hands do cannot be added to it ({}): write [run], [[fix]] and [[move]] as tables of "
-                  "their own",
-                  why));
+  throw InputError(name, fmt::format("what hands do cannot be added to it ({}): write [run], [[fix]], "
+                                     "[[move]] and [parts.NAME] as tables of "
+                                     "their own",
+                                     why));
 }
 
 }  // namespace flexel::clay

@@ -1,5 +1,6 @@
 // What hands have done to a part: a scene does the same.
 #pragma once
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -17,25 +18,40 @@ struct ClayTool {
   ToolPose pose;
 };
 
-// Everything that undo brings back.
-struct ClayDocument {
-  std::shared_ptr<const Body> body;                       // at rest, or as its shape was kept last
-  std::vector<std::string> kept;                          // scenes, each ended by keeping its shape
-  std::string material;                                   // "": the scene's own
-  std::vector<std::string> holds;                         // names of faces
-  std::vector<ClayTool> tools;                            // the last one is in the hand
-  std::uint64_t grabs = 0;                                // number of the last grab
-  std::shared_ptr<const std::vector<Vec3>> displacement;  // (elements) m, in equilibrium
+struct NumberedBody {
+  std::shared_ptr<const Body> body;
+  std::shared_ptr<const std::vector<std::uint32_t>> element;  // (elements) numbers before anything was carved
 };
 
-// Scene of what was done since the shape was kept last: `base`, holds, tools. `keep`: and the shape is kept.
+// Everything that undo brings back.
+struct ClayDocument {
+  NumberedBody start;                          // as it came, or as its shape was kept last
+  std::vector<std::string> changes;            // [[event]]s since then: what was carved, what was glued
+  NumberedBody now;                            // after these
+  std::shared_ptr<const std::string> surface;  // what the page draws of it; null: as it came
+  std::uint64_t surface_number = 0;            // 0: as it came
+  std::vector<std::string> kept;               // scenes, each ended by keeping its shape
+  std::string material;                        // "": the scene's own
+  std::map<std::string, std::string> painted;  // materials of parts that have their own
+  std::vector<std::string> holds;              // names of faces
+  std::vector<ClayTool> tools;                 // the last one is in the hand
+  std::uint64_t grabs = 0;                     // number of the last grab
+  std::shared_ptr<const std::vector<Vec3>> displacement;  // (elements of `now`) m, in equilibrium
+};
+
+// Scene of what was done since the shape was kept last: `base`, changes, holds, tools. `keep`: and the shape is kept.
 [[nodiscard]] std::string scene_text(const ClayDocument& document, const std::string& base, bool keep);
 
 // Throws InputError(name, ...): a base that is no scene, or that scene_text makes none of, holds, tools and all.
 void refuse_unkept(const std::string& base, const std::string& name);
 
+// Drops the oldest, but not the last one, while there are more than `most`, or their bodies have more elements.
+void forget_oldest(std::vector<ClayDocument>& undo, std::size_t most, std::size_t most_elements);
+
 // TOML of a name; of a ball.
 [[nodiscard]] std::string where_of_name(const std::string& name);
 [[nodiscard]] std::string where_of_ball(const Vec3& centre, double radius);
+// The [[event]] of an act that carves or glues.
+[[nodiscard]] std::string change_text(const Act& act);
 
 }  // namespace flexel::clay

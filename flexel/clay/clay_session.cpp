@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
+#include <numeric>
 
 #include "base/error.h"
 #include "base/files/json.h"
@@ -14,10 +16,12 @@
 #include "base/printable.h"
 #include "base/program/own_program.h"
 #include "base/stop.h"
+#include "flexel/clay/changed_body.h"
 #include "flexel/clay/rigid_fit.h"
 #include "flexel/clay/tar.h"
 #include "flexel/process/child.h"
 #include "formats/lattice/body_file.h"
+#include "formats/lattice/fragments_of_body.h"
 #include "formats/lattice/locate.h"
 #include "simulate/scene/scene_checks.h"
 
@@ -26,7 +30,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kMostWaiting = 256, kMostHolds = 64, kMostTools = 16, kMostUndo = 100;
+constexpr std::size_t kMostWaiting = 256, kMostHolds = 64, kMostTools = 16, kMostUndo = 100,
+                      kMostChanges = 64;
+constexpr std::size_t kMostUndoElements = 5'000'000;  // some 200 bytes each
 constexpr double kDragTolerance = 1e-4, kTolerance = 1e-8;
 constexpr int kDragIterations = 12, kIterations = 40, kMostHalvings = 6;
 constexpr double kSpring = 10;     // times the part's stiffness
@@ -35,7 +41,7 @@ constexpr std::chrono::seconds kLease{10}, kPatience{60};
 constexpr const char* kFormats[] = {"stl", "obj", "3mf", "step", "ply", "off", "glb", "vtu"};
 
 Body bent(const ClayDocument& document) {
-  Body body = *document.body;
+  Body body = *document.now.body;
   for (std::size_t e = 0; e < body.element_count(); ++e)
     body.position[e] = body.rest[e] + (*document.displacement)[e];
   return body;
@@ -49,7 +55,7 @@ std::shared_ptr<const std::vector<Vec3>> displacement_of(const Body& body) {
 
 // What a tool takes, as it is now.
 std::vector<MovedPoint> points_of(const simulate::Selected& selected, const ClayDocument& document) {
-  const Body& body = *document.body;
+  const Body& body = *document.now.body;
   std::vector<MovedPoint> points;
   for (const std::uint32_t e : selected.elements)
     points.push_back({body.rest[e], (*document.displacement)[e]});
@@ -108,7 +114,7 @@ std::string header_of(const Body& body) {
     parts.push_back({{"name", printable(body.parts[p].name)}, {"begin", begin}, {"end", end}});
   }
   const Json header = {{"flexel-live", 1},
-                       {"clay", 1},
+                       {"clay", 2},
                        {"rate", 0},
                        {"state_every", 1},
                        {"elements", body.element_count()},
@@ -126,7 +132,9 @@ bool is_motion(const Act& act) {
 ClaySession::ClaySession(std::shared_ptr<const Body> body, std::string material, std::string base)
     : base_(std::move(base)), first_(std::move(body)), hub_(header_of(*first_)) {
   ClayDocument document;
-  document.body = first_;
+  auto numbers = std::make_shared<std::vector<std::uint32_t>>(first_->element_count());
+  std::iota(numbers->begin(), numbers->end(), 0U);
+  document.start = document.now = {first_, std::move(numbers)};
   document.material = std::move(material);
   document.displacement = displacement_of(*first_);
   take_up(std::move(document));
@@ -263,7 +271,7 @@ void ClaySession::perform(const Act& act) {
 
 void ClaySession::remember() {
   undo_.push_back(document_);
-  if (undo_.size() > kMostUndo) undo_.erase(undo_.begin());
+  forget_oldest(undo_, kMostUndo, kMostUndoElements);
   redo_.clear();
 }
 
@@ -286,12 +294,22 @@ void ClaySession::change(const Act& act) {
     next.tools.pop_back();
   } else if (act.kind == Act::Kind::keep) {
     keep(next);
+  } else if (act.kind == Act::Kind::carve || act.kind == Act::Kind::glue) {
+    alter(act, next);
+  } else if (act.kind == Act::Kind::paint) {
+    paint(act, next);
   } else if (act.kind == Act::Kind::material) {
     if (next.material.empty()) throw InputError("the scene says what the part is made of");
     next.material = act.name;
+    if (!next.changes.empty()) apply_changes(next, base_);  // glue is as stiff as what it holds
   }
   ClayDocument before = document_;
-  take_up(std::move(next));
+  try {
+    take_up(std::move(next));
+  } catch (const InputError& error) {
+    if (act.kind != Act::Kind::carve) throw;
+    throw InputError(fmt::format("carve: what is left is not held and led as before ({})", error.what()));
+  }
   std::swap(before, document_);
   remember();
   document_ = std::move(before);
@@ -319,15 +337,32 @@ void ClaySession::grab(const Act& act, ClayDocument& next) const {
     where.radius = act.radius;
     tool.where = where_of_ball(act.at, act.radius);
   }
-  const std::vector<MovedPoint> points = points_of(resolve(where, *next.body), next);
+  const std::vector<MovedPoint> points = points_of(resolve(where, *next.now.body), next);
   if (points.empty()) throw InputError("no matter lies there");
   tool.middle = mean_rest(points);
   tool.pose = rigid_fit(points);
   next.tools.push_back(std::move(tool));
 }
 
+void ClaySession::paint(const Act& act, ClayDocument& next) const {
+  if (!base_.empty() && simulate::parse_scene(base_, "the scene").parts.contains(act.name))
+    throw InputError(fmt::format("the scene has a [parts.{}], which says what it is made of", act.name));
+  next.painted[act.name] = act.material;
+  if (!next.changes.empty()) apply_changes(next, base_);
+}
+
+void ClaySession::alter(const Act& act, ClayDocument& next) const {
+  if (next.changes.size() == kMostChanges)
+    throw InputError("64 places were carved or glued: hold the part, and keep its shape before the next");
+  next.changes.push_back(change_text(act));
+  apply_changes(next, base_);
+  if (act.kind != Act::Kind::carve) return;
+  next.surface = std::make_shared<const std::string>(surface_pack(next.now));
+  next.surface_number = frame_;
+}
+
 void ClaySession::keep(ClayDocument& next) const {
-  if (!model_) throw InputError("nothing has changed since the shape was kept");
+  if (!model_) throw InputError("nothing acts on the part: hold a face before its shape is kept");
   const std::vector<ToolPose> poses = model_->poses();
   if (!model_->lead(poses, kTolerance, kIterations, [] { check_stop(); }))
     throw InputError("the part is not at rest: its shape cannot be kept");
@@ -337,37 +372,38 @@ void ClaySession::keep(ClayDocument& next) const {
   model_->renormalise(*body);
   next.kept.push_back(scene_text(next, base_, true));
   next.displacement = displacement_of(*body);
-  next.body = std::move(body);
+  next.start = next.now = {std::move(body), next.now.element};
+  next.changes.clear();
   next.tools.clear();
 }
 
 // A new model of what acts now. Nothing has changed where it throws.
 void ClaySession::take_up(ClayDocument next) {
-  const simulate::Scene scene =
-      simulate::parse_scene(scene_text(next, base_, false), "what acts on the part");
-  (void)materials_of_parts(scene, *next.body);
+  simulate::Scene scene = simulate::parse_scene(scene_text(next, base_, false), "what acts on the part");
+  scene.events.clear();  // they have happened to the body
+  (void)materials_of_parts(scene, *next.now.body);
   std::unique_ptr<PulledBody> model;
   const bool held =
       !scene.get<simulate::Supports>().ties.empty() || !scene.get<simulate::Loads>().loads.empty();
   if (held) {
     Progress silent("", Progress::Mode::silent);
-    check_actions(scene, *next.body, silent);
+    check_actions(scene, *next.now.body, silent);
     std::vector<Vec3> middles;
     std::vector<ToolPose> poses;
     for (const ClayTool& tool : next.tools) {
       middles.push_back(tool.middle);
       poses.push_back(tool.pose);
     }
-    const double arm = 0.1 * bounding_box(next.body->rest).diagonal();
+    const double arm = 0.1 * bounding_box(next.now.body->rest).diagonal();
     const auto found = [&](const std::vector<Vec3>& start) {
-      model = std::make_unique<PulledBody>(*next.body, scene, middles, arm, start);
+      model = std::make_unique<PulledBody>(*next.now.body, scene, middles, arm, start);
       return model->lead(poses, kTolerance, kIterations, stop_asked());
     };
-    if (!found(*next.displacement) && !found(*displacement_of(*next.body)))
+    if (!found(*next.displacement) && !found(*displacement_of(*next.now.body)))
       throw InputError("no equilibrium is found there");
     next.displacement = std::make_shared<const std::vector<Vec3>>(model->whole_displacement());
   } else {
-    next.displacement = displacement_of(*next.body);
+    next.displacement = displacement_of(*next.now.body);
   }
   document_ = std::move(next);
   model_ = std::move(model);
@@ -442,7 +478,7 @@ void ClaySession::refine() {
   if (!document_.tools.empty() && stroke_.begun) {
     const ToolPose left = goal() - document_.tools.back().pose;
     const double way = stroke_.hand ? stroke_.hand->displacement.norm() : stroke_.target.displacement.norm();
-    const double arm = 0.1 * bounding_box(document_.body->rest).diagonal();
+    const double arm = 0.1 * bounding_box(document_.now.body->rest).diagonal();
     if (std::sqrt(left.dot(left, arm)) > (stroke_.hand ? kBalance * way : 0)) return lead();
   }
   if (model_) {
@@ -470,6 +506,8 @@ std::string ClaySession::head(std::size_t bytes) const {
     names.push_back(fmt::format("tool {}", t + 1));
     middles.push_back({tool.middle.x(), tool.middle.y(), tool.middle.z()});
   }
+  Json painted = Json::object();
+  for (const auto& [part, material] : document_.painted) painted[printable(part)] = printable(material);
   Json json = {{"frame", frame_},
                {"time", 0},
                {"late", false},
@@ -483,7 +521,9 @@ std::string ClaySession::head(std::size_t bytes) const {
                {"redo", !redo_.empty()},
                {"kept", document_.kept.size()},
                {"material", document_.material},
+               {"painted", painted},
                {"grabs", document_.grabs},
+               {"surface", document_.surface_number},
                {"settled", settled_},
                {"holder", holder_.substr(0, 8)},
                {"said", printable(said_)}};
@@ -494,14 +534,16 @@ std::string ClaySession::head(std::size_t bytes) const {
 
 void ClaySession::publish() {
   const std::vector<Vec3>& moved = *document_.displacement;
-  std::vector<Vec3> places = document_.body->rest;
-  for (std::size_t e = 0; e < moved.size(); ++e) places[e] += moved[e];
+  std::vector<Vec3> places(first_->element_count(), Vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
+  for (std::size_t e = 0; e < moved.size(); ++e)
+    places[(*document_.now.element)[e]] = document_.now.body->rest[e] + moved[e];
   const std::string positions = single_precision(places);
   std::string frame, silent;
   {
     const std::lock_guard lock(mutex_);
     frame = head(positions.size());
     silent = head(0);
+    surface_ = {document_.surface_number, document_.surface};
   }
   ++frame_;
   frame += positions;
@@ -515,12 +557,24 @@ Answer ClaySession::mapped(const std::string& name, const Body& body) const {
   write_body(body, path);
   ChildOptions options;
   options.log = folder.path() / "log";
-  const ChildRun run = run_child({own_program("flexel-map"), path, "-o", out, "--quiet"}, options);
+  std::vector<std::string> command = {own_program("flexel-map"), path, "-o", out, "--quiet"};
+  if (body.notes.contains(kCarvedNote)) command.insert(command.end(), {"--crack", "cap"});
+  const ChildRun run = run_child(command, options);
   if (run.exit_code != 0) return {500, file_text(options.log.string())};
   return {200, file_text(out)};
 }
 
+// What the page draws with does not wait for the part to come to rest.
+std::optional<Answer> ClaySession::drawn(const std::string& name) {
+  if (name == "rest.f32") return Answer{200, single_precision(first_->rest)};
+  const std::lock_guard lock(mutex_);
+  if (!surface_.second || name != fmt::format("surface-{}", surface_.first)) return std::nullopt;
+  return Answer{200, *surface_.second};
+}
+
 Answer ClaySession::save(const std::string& name) {
+  if (std::optional<Answer> now = drawn(name)) return *std::move(now);
+  if (name.starts_with("surface-")) return {404, "the part has another surface\n"};
   ClayDocument document;
   {
     std::unique_lock lock(mutex_);
@@ -529,7 +583,6 @@ Answer ClaySession::save(const std::string& name) {
     document = shown_;
   }
   try {
-    if (name == "rest.f32") return {200, single_precision(first_->rest)};
     if (name == "rest.vtu" || name == "body.vtu")
       return {200, bytes_of(name == "rest.vtu" ? *first_ : bent(document))};
     for (const char* format : kFormats)

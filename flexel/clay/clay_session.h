@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "flexel/clay/clay_document.h"
 #include "flexel/clay/frame_hub.h"
@@ -31,7 +32,8 @@ class ClaySession {
 
   // 200 and {"line": poses taken so far}; 400: no message; 409: another client holds the tool; 429: too many wait.
   [[nodiscard]] Answer act(const std::string& message);
-  // A file: "part.stl" (or another format), "scene.toml", "scene-1.toml" ..., "rest.vtu". Waits until the part is at rest.
+  // A file: "part.stl" (or another format), "scene.toml", "scene-1.toml" ..., "rest.vtu", which wait until
+  // the part is at rest; "rest.f32", "surface-3", which do not.
   // 404: no such file; 500: why it cannot be written.
   [[nodiscard]] Answer save(const std::string& name);
   // Readers of frames come with the name of their client, and go.
@@ -56,6 +58,8 @@ class ClaySession {
   void change(const Act& act);
   void grab(const Act& act, ClayDocument& next) const;
   void keep(ClayDocument& next) const;
+  void paint(const Act& act, ClayDocument& next) const;
+  void alter(const Act& act, ClayDocument& next) const;
   void take_up(ClayDocument next);
   void travel(bool back);
   void lead();
@@ -67,6 +71,7 @@ class ClaySession {
   void remember();
   [[nodiscard]] bool more_waits();
   void publish();
+  [[nodiscard]] std::optional<Answer> drawn(const std::string& name);
   [[nodiscard]] std::string head(std::size_t bytes) const;
   [[nodiscard]] Answer mapped(const std::string& name, const Body& body) const;
   [[nodiscard]] std::function<void()> stop_asked();
@@ -94,8 +99,9 @@ class ClaySession {
   Clock::time_point heard_;             // from the holder
   std::uint64_t line_ = 0, taken_ = 0;  // poses that came, that the part follows
   bool settled_ = true, stop_ = false;
-  bool news_ = false;   // the holder is another
-  ClayDocument shown_;  // the last in equilibrium
+  bool news_ = false;                                                     // the holder is another
+  ClayDocument shown_;                                                    // the last in equilibrium
+  std::pair<std::uint64_t, std::shared_ptr<const std::string>> surface_;  // of the last frame
   std::thread thread_;
 };
 

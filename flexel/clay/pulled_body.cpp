@@ -10,6 +10,7 @@
 #include "simulate/conditions/rigid_link.h"
 #include "simulate/effects/supports.h"
 #include "simulate/equilibrium/equilibrium.h"
+#include "simulate/events/fused.h"
 #include "simulate/matter/coplanar_elements.h"
 #include "simulate/models/rest_shape.h"
 #include "simulate/models/set_rest_shape.h"
@@ -84,6 +85,8 @@ PulledBody::PulledBody(const Body& body, simulate::Scene scene, std::vector<Vec3
   }
   lead_ties(poses_);
   std::vector<simulate::ActiveEffect> effects = active_effects(scene.effects, problem_);
+  if (std::vector<FusedPoint> fused = fused_points(body_); !fused.empty())
+    effects.push_back(simulate::activate(simulate::FusedPoints(body_, std::move(fused))));
   simulate::refuse_timed(effects, simulate::ActsIn::all, scene.name);
   mechanics_ = std::make_unique<simulate::Mechanics>(problem_, std::move(effects));
   state_.displacement = std::move(start);

@@ -78,27 +78,6 @@ Json pack_drawn(const Drawn& drawn, const std::string& at, ArrayPack& pack) {
   return {{"frames", drawn.displacement.size()}, {"moved", moved}, {"fields", fields}};
 }
 
-Bytes pack_file(const ViewFile& file) {
-  ArrayPack pack;
-  Json about = {{"label", printable(file.label)}};
-  about["parts"] = Json::array();
-  for (const std::string& part : file.parts) about["parts"].push_back(name_json(part));
-  about["face_names"] = Json::object();
-  std::vector<std::uint32_t> parts;
-  for (std::size_t f = 0; f < file.faces.size(); ++f) {
-    parts.push_back(file.faces[f].part);
-    if (!file.faces[f].name.empty()) about["face_names"][std::to_string(f)] = printable(file.faces[f].name);
-  }
-  pack.add_indices("face_part", parts);
-  pack.add_indices("face_number", file.face_numbers);
-  about["times"] = file.times;
-  about["facts"] = Json::array();
-  for (const auto& [name, text] : file.facts) about["facts"].push_back({printable(name), printable(text)});
-  if (file.surface) about["surface"] = pack_drawn(*file.surface, "surface", pack);
-  if (file.lattice) about["lattice"] = pack_drawn(*file.lattice, "lattice", pack);
-  return pack.finish(json_text(about));
-}
-
 // The largest absolute value of each attribute, by name.
 std::map<std::string, double> largest_values(const std::vector<ViewFile>& files) {
   std::map<std::string, double> largest;
@@ -235,6 +214,27 @@ std::string html_of(const Json& page, const std::string& data, bool whole) {
 }
 
 }  // namespace
+
+Bytes pack_file(const ViewFile& file) {
+  ArrayPack pack;
+  Json about = {{"label", printable(file.label)}};
+  about["parts"] = Json::array();
+  for (const std::string& part : file.parts) about["parts"].push_back(name_json(part));
+  about["face_names"] = Json::object();
+  std::vector<std::uint32_t> parts;
+  for (std::size_t f = 0; f < file.faces.size(); ++f) {
+    parts.push_back(file.faces[f].part);
+    if (!file.faces[f].name.empty()) about["face_names"][std::to_string(f)] = printable(file.faces[f].name);
+  }
+  pack.add_indices("face_part", parts);
+  pack.add_indices("face_number", file.face_numbers);
+  about["times"] = file.times;
+  about["facts"] = Json::array();
+  for (const auto& [name, text] : file.facts) about["facts"].push_back({printable(name), printable(text)});
+  if (file.surface) about["surface"] = pack_drawn(*file.surface, "surface", pack);
+  if (file.lattice) about["lattice"] = pack_drawn(*file.lattice, "lattice", pack);
+  return pack.finish(json_text(about));
+}
 
 std::string content_policy(const std::string& nonce, bool whole) {
   return fmt::format(

@@ -14,7 +14,9 @@
 #include "base/program/share_scope.h"
 #include "base/units.h"
 #include "flexel/picture/attribute.h"
+#include "flexel/view/carved_surface.h"
 #include "formats/lattice/body_file.h"
+#include "formats/lattice/fragments_of_body.h"
 #include "formats/lattice/locate.h"
 #include "mapping/map_refined.h"
 #include "mapping/methods/map_surface.h"
@@ -249,21 +251,42 @@ std::uint32_t nearest_element(const Body& body, const Vec3& point) {
   return nearest;
 }
 
+constexpr std::size_t kCorners = 8;
+
+// By a cell, or by `element(point)` alone.
+template <class Element>
+void carry(const Body& body, std::size_t point, const std::optional<CellPoint>& at, const Element& element,
+           Drawn& drawn) {
+  drawn.weights[kCorners * point] = 1;
+  if (!at) drawn.carriers[kCorners * point] = element();
+  for (std::size_t a = 0; at && a < kCorners; ++a) {
+    drawn.carriers[kCorners * point + a] = body.cell_elements[at->cell][a];
+    drawn.weights[kCorners * point + a] = at->weights[a];
+  }
+}
+
+void make_carriers(Drawn& drawn) {
+  drawn.carriers.assign(kCorners * drawn.shape.rest.size(), 0);
+  drawn.weights.assign(kCorners * drawn.shape.rest.size(), 0);
+}
+
 void carry(const Body& body, Drawn& drawn) {
-  constexpr std::size_t kCorners = 8;
-  const std::size_t count = drawn.shape.rest.size();
-  drawn.carriers.assign(kCorners * count, 0);
-  drawn.weights.assign(kCorners * count, 0);
-  parallel_for_each(count, [&](std::size_t p) {
+  make_carriers(drawn);
+  parallel_for_each(drawn.shape.rest.size(), [&](std::size_t p) {
     const Vec3& point = drawn.shape.rest[p];
-    const std::optional<CellPoint> at = locate_on_surface(body, drawn.shape.owner[p], point);
-    drawn.weights[kCorners * p] = 1;
-    if (!at) drawn.carriers[kCorners * p] = nearest_element(body, point);
-    for (std::size_t a = 0; at && a < kCorners; ++a) {
-      drawn.carriers[kCorners * p + a] = body.cell_elements[at->cell][a];
-      drawn.weights[kCorners * p + a] = at->weights[a];
-    }
+    carry(
+        body, p, locate_on_surface(body, drawn.shape.owner[p], point),
+        [&] { return nearest_element(body, point); }, drawn);
   });
+}
+
+void carry(const Body& body, const CarvedSurface& carved, Drawn& drawn) {
+  make_carriers(drawn);
+  for (std::size_t p = 0; p < drawn.shape.rest.size(); ++p) {
+    const std::uint32_t vertex = drawn.shape.source[p];
+    carry(
+        body, p, carved.cell[vertex], [&] { return carved.element[vertex]; }, drawn);
+  }
 }
 
 }  // namespace
@@ -272,8 +295,15 @@ ViewFile make_live_file(const Body& body, const std::string& label) {
   ViewFile file;
   file.label = label;
   add_facts(body, file);
-  file.surface = begin_surface(body.surface, file);
-  carry(body, *file.surface);
+  if (body.notes.contains(kCarvedNote)) {
+    const CarvedSurface carved = carved_surface(body);
+    file.surface = begin_surface(carved.surface, file);
+    file.face_numbers = carved.face_numbers;
+    carry(body, carved, *file.surface);
+  } else {
+    file.surface = begin_surface(body.surface, file);
+    carry(body, *file.surface);
+  }
   return file;
 }
 

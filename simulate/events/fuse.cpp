@@ -11,6 +11,7 @@
 #include <unordered_map>
 
 #include "base/error.h"
+#include "base/stop.h"
 #include "base/units.h"
 #include "simulate/models/cells.h"
 #include "simulate/models/rest_shape.h"
@@ -183,6 +184,7 @@ std::size_t fuse_parts(EventContext& context, const Chosen& chosen, const std::v
   const std::set<ElementAndPart> known = fused_to_cells(context.fused, part_of);
   std::size_t found = 0;
   for (std::uint32_t e = 0; e < body.element_count(); ++e) {
+    if (e % 256 == 0) check_stop();
     const bool is_centre = body.parts[part_of[e]].placement == Placement::centre;
     // inner ones touch nothing
     if (!chosen.elements[e] || (!is_centre && cells_at[e] == 0) || cells_at[e] == 8) continue;

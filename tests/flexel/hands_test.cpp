@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <memory>
 #include <random>
+#include <vector>
 
 #include "flexel/clay/clay_document.h"
 #include "flexel/clay/rigid_fit.h"
@@ -52,6 +54,30 @@ TEST(Hands, TheSceneSaysWhatWasDone) {
     EXPECT_EQ(ties[1].motion.through, document.tools[0].middle);
     EXPECT_FALSE(simulate::parse_scene(scene_text(document, base, false), "scene").run.renormalise);
   }
+}
+
+// A body that several documents have counts once; what is left are the last ones.
+TEST(Hands, UndoForgetsTheOldestWhereItsBodiesAreLarge) {
+  std::vector<ClayDocument> undo;
+  for (std::uint64_t k = 0; k < 12; ++k) {
+    ClayDocument& document = undo.emplace_back();
+    Body body;
+    body.rest.resize(10);
+    const bool same = k % 2 == 1;
+    document.start.body = document.now.body =
+        same ? undo[k - 1].now.body : std::make_shared<const Body>(std::move(body));
+    document.grabs = k;
+  }
+  forget_oldest(undo, 100, 60);
+  EXPECT_EQ(undo.size(), 12U);
+  forget_oldest(undo, 11, 60);
+  ASSERT_EQ(undo.size(), 11U);
+  forget_oldest(undo, 100, 30);
+  ASSERT_EQ(undo.size(), 6U);
+  EXPECT_EQ(undo.front().grabs, 6U);
+  forget_oldest(undo, 100, 0);
+  ASSERT_EQ(undo.size(), 1U);
+  EXPECT_EQ(undo.front().grabs, 11U);
 }
 
 }  // namespace

@@ -16,7 +16,8 @@ constexpr const char* kMessage =
     "0.004\n"
     "hand 0 0 -0.005\nhand 0 0 -0.005 0 0.1 0\n0 1e-3 0 0\n0 1e-3 2e-3 0 0 0.1 "
     "0\nstay\nrelease\nkeep\nundo\nredo\n"
-    "material PLA\ntake\n";
+    "material PLA\ncarve at 0.08 0.02 0.003 0.004\npaint steel bracket\nglue at 0.08 0.02 0.003 0.004 "
+    "0.0005\ntake\n";
 
 // Names and numbers of a message are those of a scene that can be read.
 void check_scene(const clay::ActMessage& message) {
@@ -24,6 +25,9 @@ void check_scene(const clay::ActMessage& message) {
   document.material = "PLA";
   for (const clay::Act& act : message.acts) {
     if (!act.pose.displacement.allFinite() || !act.pose.turn.allFinite() || !act.at.allFinite()) std::abort();
+    if (act.kind == clay::Act::Kind::carve || act.kind == clay::Act::Kind::glue)
+      document.changes.push_back(clay::change_text(act));
+    if (act.kind == clay::Act::Kind::paint) document.painted[act.name] = act.material;
     if (act.kind == clay::Act::Kind::hold) document.holds.push_back(act.name);
     if (act.kind == clay::Act::Kind::grab)
       document.tools.push_back(

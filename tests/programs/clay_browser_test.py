@@ -8,8 +8,8 @@ import time
 
 from browser import chromium
 from browser_test import centre_of_face, expect_silence
-from clay_test import clay, corners, farthest, saved
-from harness import bracket, expect, expect_ok, main, run
+from clay_test import clay, corners, expect_same_run, farthest, saved
+from harness import ascii_stl, box_triangles, bracket, expect, expect_ok, main, run
 
 
 def settle(browser):
@@ -131,6 +131,181 @@ def test_the_way_of_someone_new_by_keys():
         with tarfile.open("scene.tar") as files:
             expect(files.getnames() == ["rest.vtu", "scene-1.toml", "scene.toml"], f"{files.getnames()}")
             expect(b"renormalise" in files.extractfile("scene-1.toml").read(), "the scenes are whole")
+        expect_silence(browser)
+
+
+def expect_drawn_as_saved(browser, url):
+    """The page's triangles enclose what the saved STL does, now, and have its box; elements that are gone draw nothing."""
+    browser.wait("!flexelView.clay.renewing && flexelView.clay.surface === flexelView.clay.frame.surface && !flexelView.clay.asked")
+    drawn = browser.run("""
+        const {shape} = flexelView.picture.panels[0], at = p => shape.restOf(p).map((x, k) => 1e3 * (x + shape.displacementOf(p, 0)[k]));
+        const box = [[1e9, 1e9, 1e9], [-1e9, -1e9, -1e9]];
+        let volume = 0, finite = true;
+        for (let t = 0; t < shape.triangles.length; t += 3) {
+          const [a, b, c] = [0, 1, 2].map(k => at(shape.triangles[t + k]));
+          volume += (a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])) / 6;
+          for (const corner of [a, b, c]) corner.forEach((x, k) => {
+            finite &&= Number.isFinite(x);
+            box[0][k] = Math.min(box[0][k], x);
+            box[1][k] = Math.max(box[1][k], x);
+          });
+        }
+        return {volume, box, finite, walls: shape.face.filter(face => flexelView.picture.panels[0].faceName(face).odd).length};""")
+    places = corners(saved(url, "part.stl"))
+    volume = sum(a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+                 for a, b, c in zip(places[0::3], places[1::3], places[2::3])) / 6
+    expect(drawn["finite"] and abs(drawn["volume"] / volume - 1) < 2e-3, f"{drawn} {volume}")
+    for k in range(3):
+        for end, of in ((0, min), (1, max)):
+            expect(abs(drawn["box"][end][k] - of(p[k] for p in places)) < 0.05, f"{drawn['box']}")
+    return drawn["volume"], drawn["walls"]
+
+
+def test_a_ball_is_carved_out_by_a_click():
+    """The drawn part, the saved STL and a run of the saved scene are the same; undone, the page has the whole part again."""
+    bracket()
+    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _), chromium() as browser:
+        x, y = bent_by_hand(browser, url, "z")
+        browser.mouse(("move", x, y), ("up",))
+        settle(browser)
+        whole, walls = expect_drawn_as_saved(browser, url)
+        expect(walls == 0, "nothing is carved")
+        bent = browser.run("return flexelView.clay.frame.felt[0][2]")
+        browser.choose("ball", "7")
+        choose_hand(browser, "carve")
+        browser.click(*centre_of_face(browser, "bracket/3"))
+        browser.wait("flexelView.clay.frame.surface !== 0", 60)
+        settle(browser)
+        volume, walls = expect_drawn_as_saved(browser, url)
+        expect(volume < whole - 100 and walls > 10, f"a hole of some {whole - volume} mm3")
+        expect(0 < browser.run("return flexelView.clay.frame.felt[0][2]") < bent, "and the part is weaker")
+        frame = browser.run("const {positions, ...frame} = flexelView.clay.frame; return frame")
+        expect_same_run(url, frame, ("--crack", "cap"))
+        browser.run("document.getElementById('undo').click()")
+        browser.wait("flexelView.clay.frame.surface === 0")
+        settle(browser)
+        expect(abs(expect_drawn_as_saved(browser, url)[0] / whole - 1) < 1e-6, "the part is whole again")
+        expect_silence(browser)
+
+
+def test_a_ball_is_carved_out_by_keys_and_a_page_that_comes_later_draws_it():
+    bracket()
+    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _), chromium() as browser:
+        browser.open(url.geturl())
+        settle(browser)
+        whole, _ = expect_drawn_as_saved(browser, url)
+        browser.choose("ball", "7")
+        browser.choose("face", "bracket/2")
+        place = browser.run("return ['x', 'y', 'z'].map(axis => Number(document.getElementById('at-' + axis).value))")
+        expect(place[0] == 80 and 0 < place[1] < 40 and 0 < place[2] < 6, f"a place on the face: {place}")
+        for axis, value in (("x", "40"), ("y", "20"), ("z", "6")):
+            browser.choose(f"at-{axis}", value)
+        browser.run("document.getElementById('carve').focus()")
+        browser.keys("\ue007")
+        browser.wait("flexelView.clay.frame.surface !== 0", 60)
+        settle(browser)
+        expect(expect_drawn_as_saved(browser, url)[0] < whole - 100, "carved by keys")
+        expect(b"centre = [\"0.04" in saved(url, "scene.toml"), "where the numbers say")
+        drawn = expect_drawn_as_saved(browser, url)
+        browser.open(url.geturl())  # a page that comes later
+        browser.wait("flexelView.clay.frame?.surface")
+        expect(expect_drawn_as_saved(browser, url) == drawn, "a page that comes later draws the same")
+        # what was carved has no face to hold; the page before has to have let the tool go
+        browser.wait("flexelView.clay.mine", 60)
+        choose_hand(browser, "hold")
+        browser.run("flexelView.clay.toggleHold('bracket/carved')")
+        browser.wait("document.getElementById('hands-said').innerText.includes('bracket/carved')")
+        expect_silence(browser)
+
+
+def test_parts_are_glued_and_painted():
+    low = box_triangles((40.0, 10.0, 5.0))
+    high = [[(x, y, z + 5.3) for x, y, z in triangle] for triangle in low]
+    pathlib.Path("two.stl").write_bytes(ascii_stl(low, "low") + ascii_stl(high, "high"))
+    with clay("two.stl", "--size", "2.5 mm") as (url, _), chromium() as browser:
+        browser.open(url.geturl())
+        settle(browser)
+        browser.choose("ball", "100")
+        browser.choose("within", "0.5")
+        choose_hand(browser, "glue")
+        browser.click(*centre_of_face(browser, "high/2"))
+        browser.wait("flexelView.clay.frame.undo")
+        for face, button in (("low/5", "face-hold"), ("high/6", "face-pull")):
+            browser.choose("face", face)
+            browser.run("document.getElementById(arguments[0]).click()", button)
+        browser.wait("flexelView.clay.frame.tools.length === 1")
+        browser.choose("lead-z", "-1")
+        browser.run("document.getElementById('lead').click()")
+        browser.wait("flexelView.clay.frame.place[0][2] === -0.001 && flexelView.clay.frame.settled")
+        frame = browser.run("const {positions, ...frame} = flexelView.clay.frame; return frame")
+        expect_same_run(url, frame)
+        expect_drawn_as_saved(browser, url)
+        browser.choose("paint-with", "spring steel")
+        browser.choose("face", "low/2")
+        browser.run("document.getElementById('face-paint').click()")
+        browser.wait("flexelView.clay.frame.painted.low === 'spring-steel'")
+        choose_hand(browser, "paint")
+        browser.choose("paint-with", "ABS")
+        browser.click(*centre_of_face(browser, "high/2"))
+        browser.wait("flexelView.clay.frame.painted.high === 'ABS'")
+        settle(browser)
+        expect(browser.text("painted") == "Painted: high with ABS, low with spring-steel", browser.text("painted"))
+        expect_same_run(url, browser.run("const {positions, ...frame} = flexelView.clay.frame; return frame"))
+        expect_silence(browser)
+
+
+def pointer(browser, kind, *actions):
+    """Of a "pen" or a "touch" that stays down from one call to the next."""
+    browser.ask("POST", "/actions", {"actions": [{"type": "pointer", "id": kind, "parameters": {"pointerType": kind}, "actions": list(actions)}]})
+
+
+def moved(x, y, pressure):
+    return {"type": "pointerMove", "duration": 0, "x": round(x), "y": round(y), "pressure": pressure}
+
+
+DOWN, UP = {"type": "pointerDown", "button": 0, "pressure": 0.25}, {"type": "pointerUp", "button": 0}
+
+
+def test_a_pen_pushes_with_its_pressure_and_a_touch_is_felt():
+    bracket()
+    with clay("bracket.step", "--size", "5 mm") as (url, _), chromium() as browser:
+        browser.open(url.geturl())
+        settle(browser)
+        browser.choose("face", "bracket/1")
+        browser.run("document.getElementById('face-hold').click()")
+        browser.wait("flexelView.clay.frame.holds.length === 1")
+        choose_hand(browser, "pull")
+        browser.choose("ball", "8")
+        browser.run("""const {clay} = flexelView, post = clay.post.bind(clay);
+            window.posted = [];
+            clay.post = (...lines) => { posted.push(...lines); post(...lines); };
+            flexelView.controls.look('iso');""")
+        hand = "[...posted].reverse().find(line => line.startsWith('hand'))?.split(' ').slice(1, 4).map(Number)"
+        x, y = centre_of_face(browser, "bracket/3")
+        pointer(browser, "pen", moved(x, y, 0), DOWN)
+        browser.wait("flexelView.clay.drag?.base")
+        for pressure in (0.5, 0.75, 0.25):
+            pointer(browser, "pen", moved(x, y, pressure))
+            browser.wait(f"Math.abs({hand}?.[2] + {pressure} * 0.008) < 1e-6")
+            expect(max(map(abs, browser.run(f"return {hand}")[:2])) < 1e-6, "into the face and nowhere else")
+            settle(browser)
+        place, felt = browser.run("const {place, felt} = flexelView.clay.frame; return [place[0], felt[0]]")
+        expect(-0.25 * 0.008 < place[2] < -0.2 * 0.008 and felt[2] > 0, f"the tool lags a little behind, and the part pushes back: {place} {felt}")
+        pointer(browser, "pen", UP)
+        settle(browser)
+        expect(abs(browser.run("return flexelView.clay.frame.place[0][2]") / place[2] - 1) < 1e-3, "the tool stays there")
+        browser.run("""window.buzz = []; window.shaken = []; flexelView.clay.strongest = 0;
+            navigator.vibrate = ms => window.buzz.push(ms) > 0;
+            navigator.getGamepads = () => [null, {vibrationActuator: {playEffect: async (kind, how) => window.shaken.push(how.strongMagnitude)}}];""")
+        pointer(browser, "touch", moved(x, y, 0), DOWN)
+        browser.wait("flexelView.clay.drag?.base")
+        pointer(browser, "touch", moved(x, y + 30, 0))
+        browser.wait("buzz.length > 0 && shaken.length > 0", 60)
+        pointer(browser, "touch", UP)
+        settle(browser)
+        buzz, shaken = browser.run("return [buzz, shaken]")
+        expect(max(shaken) == 1 and min(shaken) >= 0, f"a gamepad shakes with the share of the largest force: {shaken}")
+        expect(len(buzz) == len(shaken) and all(abs(ms - 20 * share) <= 0.5 for ms, share in zip(buzz, shaken)), f"a phone as long: {buzz} {shaken}")
         expect_silence(browser)
 
 

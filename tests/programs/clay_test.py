@@ -2,18 +2,21 @@
 
 import contextlib
 import http.client
+import io
 import json
+import math
 import pathlib
 import re
 import socket
 import struct
 import subprocess
 import sys
+import tarfile
 import threading
 import time
 import urllib.parse
 
-from harness import BIN, SOURCE, bracket, expect, expect_error, expect_ok, main, run, write
+from harness import BIN, SOURCE, ascii_stl, box_triangles, bracket, expect, expect_error, expect_ok, main, run, write
 
 sys.path.insert(0, str(SOURCE / "bench" / "live"))
 from client import Frames  # noqa: E402
@@ -186,6 +189,114 @@ def test_undo_and_redo_lead_back_and_forth():
         expect(frame["undo"] and not frame["redo"], "all is done again")
 
 
+def gone(frame):
+    """The elements that were carved away."""
+    return [e for e in range(len(frame["positions"]) // 3) if math.isnan(frame["positions"][3 * e])]
+
+
+def same(a, b, far=1e-7):
+    return all(math.isnan(x) and math.isnan(y) or abs(x - y) < far for x, y in zip(a, b, strict=True))
+
+
+def felt_of_run(summary):
+    """The force of the part on the last tool, as the summary of a run has it."""
+    return [-x for x in json.loads(pathlib.Path(summary).read_text())["reactions"][-1]["force"]]
+
+
+def expect_same_run(url, frame, surface=()):
+    """The saved scenes, run without hands, end in what the hands have: the part that was saved, and the force."""
+    bent = saved(url, "part.stl")
+    with tarfile.open(fileobj=io.BytesIO(saved(url, "scene.tar"))) as files:
+        names = files.getnames()
+        for name in names:
+            pathlib.Path(name).write_bytes(files.extractfile(name).read())
+    body = "rest.vtu"
+    for name in names[1:]:
+        expect_ok(run("flexel-simulate", name, body, "-o", f"{name}.vtu", "--no-estimate", "--summary", "run.json"))
+        body = f"{name}.vtu"
+    expect_ok(run("flexel-map", body, "-o", "run.stl", "--quiet", *surface))
+    data = pathlib.Path("run.stl").read_bytes()
+    expect(len(data) == len(bent) and farthest(data, bent) < 1e-3, f"the part is that of the scenes within a micrometre: {len(data)} {len(bent)}")
+    force, felt = felt_of_run("run.json"), frame["felt"][-1][:3]
+    expect(max(abs(a - b) for a, b in zip(force, felt)) < 1e-4 * max(map(abs, force)), f"and so is the force: {felt} {force}")
+
+
+def test_carving_is_that_of_the_saved_scene():
+    bracket()
+    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _):
+        hand = Hand(url, 16 * "a")
+        hand.act("hold bracket/1", "grab face bracket/2")
+        whole = hand.act("0 0 0 -0.002")
+        carved = hand.act("carve at 0.04 0.02 0.006 0.009")
+        expect(not carved["said"] and not gone(whole) and len(gone(carved)) > 10, f"{carved['said']} {len(gone(carved))}")
+        expect(len(carved["positions"]) == len(whole["positions"]) and carved["place"] == whole["place"], "the tool stays where it is")
+        expect(0.3 < math.hypot(*carved["felt"][-1][:3]) / math.hypot(*whole["felt"][-1][:3]) < 0.95, f"it is weaker: {whole['felt']} {carved['felt']}")
+        expect(carved["surface"] != 0 and saved(url, f"surface-{carved['surface']}")[:4] == b"FLXV", "the page gets what is left")
+        expect(ask(url, f"{url.path}save/surface-{carved['surface'] + 1}")[0] == 404, "and no other")
+        expect_same_run(url, carved, ("--crack", "cap"))
+        status, _, text = ask(url, url.path + "save/part.step")
+        expect(status == 500 and b"write a mesh" in text, f"STEP keeps faces whole: {status} {text}")
+        expect(same(hand.act("undo")["positions"], whole["positions"]) and hand.last["surface"] == 0, "undone")
+        expect(same(hand.act("redo")["positions"], carved["positions"]) and hand.last["surface"] == carved["surface"], "done again")
+        # kept, carved again and made of another material: two scenes
+        hand.act("keep", "carve at 0.02 0.04 0.003 0.006", "material ABS", "grab face bracket/2")
+        base = hand.last["place"][-1]
+        frame = hand.act("0 " + " ".join(str(x + d) for x, d in zip(base, [0, 0.001, 0, 0, 0, 0])))
+        expect(not frame["said"] and len(gone(frame)) > len(gone(carved)), f"{frame['said']}")
+        expect_same_run(url, frame, ("--crack", "cap"))
+        for lines, said in ((["carve at 1 1 1 0.001"], "no element"), (["carve at 0.04 0.02 0.03 1"], "leaves nothing"), (["carve at 0.08 0.02 0.003 0.025"], "is not held and led as before"), (["glue at 0.04 0.02 0.003 0.01 0.001"], "fuse")):
+            frame = hand.act(*lines)
+            expect(said in frame["said"] and frame["undo"], f"{lines}: {frame['said']!r}")
+
+
+def test_a_page_gets_the_surface_while_acts_wait():
+    bracket()
+    with clay("bracket.step", "--size", "4 mm") as (url, _):
+        hand = Hand(url, 16 * "a")
+        expect("hold a face" in hand.act("carve at 0.04 0.02 0.006 0.009", "keep")["said"], f"nothing holds it: {hand.last['said']}")
+        expect(not hand.act("hold bracket/1", "keep")["said"], f"held, it is kept: {hand.last['said']}")
+        surface = hand.act("grab face bracket/2", "0 0 0 -0.001")["surface"]
+        expect(hand.post(*(["release", "undo"] * 120))[0] == 200, "they take seconds")
+        end = time.monotonic() + 30
+        while hand.last["settled"]:
+            expect(time.monotonic() < end, "they are begun")
+            time.sleep(0.005)
+        for name in (f"surface-{surface}", "rest.f32"):
+            expect(ask(url, f"{url.path}save/{name}")[0] == 200 and not hand.last["settled"], f"{name} does not wait for a part at rest")
+
+
+def test_glue_holds_parts_together_as_in_the_saved_scene():
+    low = box_triangles((40.0, 10.0, 5.0))
+    high = [[(x, y, z + 5.3) for x, y, z in triangle] for triangle in low]
+    pathlib.Path("two.stl").write_bytes(ascii_stl(low, "low") + ascii_stl(high, "high"))
+    with clay("two.stl", "--size", "2.5 mm", "--material", "PLA") as (url, _):
+        hand = Hand(url, 16 * "a")
+        expect("high" in hand.act("hold low/5")["said"], f"the other part is free: {hand.last['said']}")
+        expect("fuse" in hand.act("glue at 0.02 0.005 0.005 1 0.0001")["said"], f"it does not reach so far: {hand.last['said']}")
+        hand.act("glue at 0.02 0.005 0.005 1 0.0005", "hold low/5", "grab face high/6")
+        frame = hand.act("0 0 0 -0.001")
+        expect(not frame["said"], frame["said"])
+        expect_same_run(url, frame)
+        soft = frame["felt"][-1][2]
+        frame = hand.act("material steel")
+        expect_same_run(url, frame)  # the glue is as stiff as what it holds
+        expect(frame["felt"][-1][2] > 20 * soft > 0, f"{soft} {frame['felt']}")
+        # A part of its own material
+        hand.act("undo")
+        frame = hand.act("paint spring-steel high")
+        expect(not frame["said"] and frame["painted"] == {"high": "spring-steel"} and frame["felt"][-1][2] > 1.5 * soft, f"{frame['said']} {frame['felt']}")
+        expect_same_run(url, frame)
+        expect(b'[parts."high"]' in saved(url, "scene.toml"), "its scene says so")
+        expect("no part" in hand.act("paint steel hihg")["said"] and "butter" in hand.act("paint butter low")["said"], "refused by name")
+        expect(abs(hand.act("undo")["felt"][-1][2] / soft - 1) < 1e-6 and hand.last["painted"] == {}, "undone")
+        # Glued at one end only the two bend side by side.
+        hand.act("undo", "undo", "undo", "undo")
+        expect(not hand.last["undo"], "all is undone")
+        hand.act("glue at 0 0.005 0.005 0.006 0.0005", "hold low/5", "grab face high/6")
+        frame = hand.act("0 0 0 -0.001")
+        expect(not frame["said"] and 0 < frame["felt"][-1][2] < 0.8 * soft, f"{frame['said']} {frame['felt']} {soft}")
+
+
 def test_what_cannot_be_is_said_and_harms_nothing():
     bracket()
     with clay("bracket.step", "--size", "8 mm") as (url, process):
@@ -198,7 +309,9 @@ def test_what_cannot_be_is_said_and_harms_nothing():
         frame = hand.act("0 -0.2 0 0")  # through the wall that holds it
         expect("does not follow" in frame["said"], f"{frame['said']!r}")
         bad = ["", "hold x", "client 1", "client 0123456789abcdeF\n", "client 0123456789abcdef\nfly", "client 0123456789abcdef\nhand nan 0 0",
-               "client 0123456789abcdef\nhand 1e9 0 0", "client 0123456789abcdef\ngrab at 0 0 0 -1", "client 0123456789abcdef\nhold \x1b[31m",
+               "client 0123456789abcdef\nhand 1e9 0 0", "client 0123456789abcdef\ngrab at 0 0 0 -1",
+               "client 0123456789abcdef\ncarve at 0 0 0", "client 0123456789abcdef\ncarve at 0 0 0 0", "client 0123456789abcdef\nglue at 0 0 0 1", "client 0123456789abcdef\npaint steel", "client 0123456789abcdef\npaint  bracket",
+               "client 0123456789abcdef\nglue at 0 0 0 1 nan", "client 0123456789abcdef\ncarve face bracket/1", "client 0123456789abcdef\nhold \x1b[31m",
                "client 0123456789abcdef\n0 1 2", "client 0123456789abcdef\nundo now", "client 0123456789abcdef\n" + 300 * "undo\n"]
         for content in bad:
             status, text = post(url, content)
@@ -336,12 +449,13 @@ def test_arguments():
     expect_error(refused("bracket.step", "--size", "1 mm", "--count", "5"), "flexel", "--count")
     expect_error(refused("bracket.step", "--scene", "time.toml"), "flexel", "run in time")
     expect_error(refused("bracket.step", "--scene", "time.toml", "--material", "ABS"), "flexel", "give one")
-    write("load.toml", 'material = "PLA"\n[run]\ntolerance = 1e-8\n[[fix]]\nwhere = "bracket/1"\n[[load]]\nwhere = "bracket/2"\nforce = ["0 N", "0 N", "-50 N"]\n')
+    write("load.toml", 'material = "PLA"\n[parts.bracket]\nmaterial = "PLA"\n[run]\ntolerance = 1e-8\n[[fix]]\nwhere = "bracket/1"\n[[load]]\nwhere = "bracket/2"\nforce = ["0 N", "0 N", "-50 N"]\n')
     with clay("bracket.step", "--scene", "load.toml", "--size", "5 mm") as (url, _):
         hand = Hand(url, 16 * "a")
         bent = hand.settled()["positions"]
         hand.act("grab face bracket/8")
         expect("the scene says" in hand.act("material ABS")["said"], "its material is the scene's")
+        expect("[parts.bracket]" in hand.act("paint ABS bracket")["said"], "and that of its parts")
         saved(url, "part.stl")
         saved(url, "scene.toml")
         expect(max(abs(a - b) for a, b in zip(bent, hand.last["positions"])) < 1e-3, "the load acts on")

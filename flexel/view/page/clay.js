@@ -3,6 +3,7 @@
 import {button, element} from "./elements.js";
 import {numberText} from "./numbers.js";
 import {readFrames} from "./stream.js";
+import {unpack} from "./unpack.js";
 
 const kFormats = ["stl", "obj", "3mf", "step"], kTurnPerPixel = 0.01, kCorners = 8;  // rad
 
@@ -11,7 +12,7 @@ const hex = bytes => [...bytes].map(byte => byte.toString(16).padStart(2, "0")).
 export class Clay {
   constructor(picture, controls, page) {
     Object.assign(this, {picture, controls, about: page.clay, panel: picture.panels[0], frame: undefined, drag: undefined,
-                         waiting: [], busy: false, mode: "hold", shown: 0, latencies: [], sent: []});
+                         waiting: [], busy: false, mode: "hold", surface: 0, shown: 0, latencies: [], sent: []});
     this.client = hex(crypto.getRandomValues(new Uint8Array(8)));
     this.shape = this.panel.shape;
     page.units.displacement = page.units["/size"];
@@ -28,6 +29,7 @@ export class Clay {
     if (!answer.ok) throw new Error(await answer.text());
     this.rest = new Float32Array(await answer.arrayBuffer());
     this.facePlaces = this.placesOfFaces();
+    this.aimAtFace();
     readFrames(this.client, frame => this.take(frame), (yes, why) => this.setConnected(yes, why));
   }
 
@@ -41,21 +43,26 @@ export class Clay {
       each.addEventListener("change", () => { this.mode = each.value; });
     const faces = this.by("face");
     this.faceNames = [...new Set(this.shape.face)].sort((a, b) => a - b).map(face => this.panel.faceName(face)).filter(name => !name.odd);
+    this.partOfFace = new Map([...new Set(this.shape.face)].map(face => [this.panel.faceName(face).text, this.panel.partName(face)]));
     for (const name of this.faceNames) element("option", {value: name.text, textContent: name.text}, faces);
     on("face-hold", "click", () => this.toggleHold(faces.value));
     on("face-pull", "click", () => this.post("grab face " + faces.value));
+    on("face-paint", "click", () => this.paint(this.partOfFace.get(faces.value)));
     on("stay", "click", () => this.post("release"));
     on("keep", "click", () => this.post("keep"));
     on("undo", "click", () => this.post("undo"));
     on("redo", "click", () => this.post("redo"));
     on("take", "click", () => this.post("take"));
     on("lead", "click", () => this.leadExactly());
-    this.by("ball-unit").textContent = this.unit.name;
+    on("face", "change", () => this.aimAtFace());
+    for (const act of ["carve", "glue"]) on(act, "click", () => this.change(act, this.triple("at-")));
     for (const each of document.querySelectorAll(".length-unit")) each.textContent = this.unit.name;
     this.by("ball").value = Number((2 * about.spacing / this.unit.factor).toPrecision(2));
+    this.by("within").value = Number((about.spacing / this.unit.factor).toPrecision(2));
     const materials = this.by("material");
     if (about.material && !about.materials.includes(about.material)) about.materials.unshift(about.material);
-    for (const name of about.materials) element("option", {value: name, textContent: name}, materials);
+    for (const box of [materials, this.by("paint-with")])
+      for (const name of about.materials) element("option", {value: name, textContent: name}, box);
     this.by("material-row").hidden = !about.material;
     on("material", "change", box => this.post("material " + box.value));
     for (const format of kFormats)
@@ -77,10 +84,31 @@ export class Clay {
     this.showState();
   }
 
-  leadExactly() {
-    const number = id => Number(this.by(id).value) || 0;
-    const way = ["x", "y", "z"].map(axis => number("lead-" + axis) * this.unit.factor);
-    this.post(`0 ${way.join(" ")}`, "stay");
+  // m
+  length(id) { return (Number(this.by(id).value) || 0) * this.unit.factor; }
+  triple(ids) { return ["x", "y", "z"].map(axis => this.length(ids + axis)); }
+
+  leadExactly() { this.post(`0 ${this.triple("lead-").join(" ")}`, "stay"); }
+
+  // By keys a place is given in numbers; that of the chosen face to begin with.
+  aimAtFace() {
+    const at = this.facePlaces.get(this.by("face").value);
+    if (!at) return;
+    this.panel.restOf(at).forEach((x, k) => { this.by("at-" + "xyz"[k]).value = Number((x / this.unit.factor).toPrecision(6)); });
+  }
+
+  get radius() { return Math.max(1e-9, this.length("ball")); }
+
+  // Carves or glues in the ball about a place at rest.
+  change(act, rest) {
+    const ball = `${act} at ${rest.join(" ")} ${this.radius}`;
+    this.post(act === "glue" ? `${ball} ${Math.max(1e-9, this.length("within"))}` : ball);
+  }
+
+  // Blanks in a material's name do not matter, and divide the words of an act.
+  paint(part) {
+    if (part.odd) return this.say(`${part.text} has no name that can be typed`, "warning");
+    this.post(`paint ${this.by("paint-with").value.replaceAll(" ", "-")} ${part.text}`);
   }
 
   toggleHold(name) {
@@ -147,18 +175,23 @@ export class Clay {
     const at = this.place(event), hit = this.picture.pick(...at);
     if (!hit) return;
     event.stopPropagation();
-    if (this.mode === "hold") return this.toggleHold(this.panel.faceName(this.shape.face[hit.triangle]).text);
-    this.picture.canvas.setPointerCapture(event.pointerId);
     const rest = this.panel.restOf(hit), name = this.panel.faceName(this.shape.face[hit.triangle]);
-    this.drag = {from: at, now: at, pointer: event.pointerId, mode: this.mode, grabs: this.frame.grabs, axes: this.picture.view.axes};
-    const radius = Math.max(1e-9, Number(this.by("ball").value) * this.unit.factor);
-    this.post(this.by("takes").value === "face" ? `grab face ${name.text}` : `grab at ${rest.join(" ")} ${radius}`);
+    if (this.mode === "hold") return name.odd ? this.say(`${name.text} is no face that has a name`, "warning") : this.toggleHold(name.text);
+    if (this.mode === "paint") return this.paint(this.panel.partName(this.shape.face[hit.triangle]));
+    if (this.mode === "carve" || this.mode === "glue") return this.change(this.mode, rest);
+    const byFace = this.by("takes").value === "face";
+    if (byFace && name.odd) return this.say(`${name.text} is no face that has a name`, "warning");
+    this.picture.canvas.setPointerCapture(event.pointerId);
+    this.drag = {from: at, now: at, pointer: event.pointerId, mode: this.mode, grabs: this.frame.grabs, axes: this.picture.view.axes,
+                 touch: event.pointerType === "touch", pen: event.pointerType === "pen", pressure: event.pressure, into: this.panel.normalOf(hit).negate()};
+    this.post(byFace ? `grab face ${name.text}` : `grab at ${rest.join(" ")} ${this.radius}`);
   }
 
   move(event) {
     if (!this.drag || event.pointerId !== this.drag.pointer) return;
     event.stopPropagation();
     this.drag.now = this.place(event);
+    this.drag.pressure = event.pressure;
     this.follow();
   }
 
@@ -182,9 +215,10 @@ export class Clay {
       const way = right.clone().multiplyScalar(x / metre).addScaledVector(up, -y / metre);
       const along = this.by("along").value;
       if (along !== "any") this.keepAlong(way, along, right, up);
+      if (drag.pen) way.addScaledVector(drag.into, drag.pressure * this.radius);
       [way.x, way.y, way.z].forEach((value, k) => { pose[k] += value; });
     }
-    if (x !== 0 || y !== 0) this.post("hand " + pose.join(" "));
+    if (x !== 0 || y !== 0 || drag.pen) this.post("hand " + pose.join(" "));
     if (!drag.done) return;
     this.drag = undefined;
     this.post("stay");
@@ -212,15 +246,48 @@ export class Clay {
     if (text !== this.told) this.say(text, frame.said ? "warning" : "faint");
     this.told = text;
     if (frame.positions) this.fresh = frame.positions;
+    if (frame.surface !== this.surface) this.renewSurface();
+    this.askToShow();
+  }
+
+  askToShow() {
     if (this.asked) return;
     this.asked = true;
     requestAnimationFrame(() => this.show());
   }
 
+  // Carving, and undoing it, gives the part another surface; what is drawn stays until that has come.
+  async renewSurface() {
+    if (this.renewing) return;
+    this.renewing = true;
+    try {
+      for (let number; (number = this.frame.surface) !== this.surface; ) {
+        const answer = await fetch(number === 0 ? "data/0" : `save/surface-${number}`);
+        if (!answer.ok && number !== this.frame.surface) continue;
+        if (answer.status === 404) break;  // another has come; the frame that says so is on its way
+        if (!answer.ok) throw new Error(await answer.text());
+        this.panel.replaceSurface(await unpack(new Uint8Array(await answer.arrayBuffer())));
+        this.shape = this.panel.shape;
+        this.surface = number;
+      }
+      this.controls.probes.clear();
+      this.panel.setInk(this.picture.state.theme);
+      this.facePlaces = this.placesOfFaces();
+      this.fresh = this.frame.positions;
+      this.askToShow();
+    } catch (error) {
+      this.say(`what was carved is not shown (${error.message.trim()})`, "warning");
+    } finally {
+      this.renewing = false;
+    }
+  }
+
   show() {
     this.asked = false;
-    if (this.fresh) this.bend(this.fresh);
-    this.fresh = undefined;
+    if (this.fresh && this.surface === this.frame.surface && !this.renewing) {
+      this.bend(this.fresh);
+      this.fresh = undefined;
+    }
     this.showState();
     ++this.shown;
     const arrived = this.sent.filter(each => each.line <= this.frame.line);
@@ -282,10 +349,13 @@ export class Clay {
       this.by("undo").disabled = !frame.undo;
       this.by("redo").disabled = !frame.redo;
       for (const id of ["stay", "lead"]) this.by(id).disabled = frame.tools.length === 0;
-      this.by("keep").disabled = frame.tools.length === 0;
+      this.by("keep").disabled = frame.tools.length === 0 && frame.holds.length === 0;
     }
     this.by("held").textContent = frame.holds.length > 0 ? frame.holds.join(", ") : "nothing yet: click a face";
     if (frame.material) this.by("material").value = frame.material;
+    const painted = Object.entries(frame.painted);
+    this.by("painted").hidden = painted.length === 0;
+    this.by("painted").textContent = "Painted: " + painted.map(([part, material]) => `${part} with ${material}`).join(", ");
     const last = frame.tools.length - 1;
     const way = last < 0 ? 0 : Math.hypot(...frame.place[last].slice(0, 3)) / this.unit.factor;
     this.by("feel").textContent = last < 0 ? "nothing" : `${this.forceText(last)} at ${numberText(way, 3)}\u00a0${this.unit.name}` + this.turnText(last) + (frame.settled ? "" : " \u2026");

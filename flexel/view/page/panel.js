@@ -56,6 +56,12 @@ class Drawing {
     }
     this.geometry.setIndex(coarse && this.few ? this.few : this.full);
   }
+  dispose() {
+    for (const object of this.group.children) {
+      object.geometry.dispose();
+      object.material.dispose();
+    }
+  }
   // A ghost is not cut open but cut off.
   show(visible, cut, ghost) {
     this.surface.visible = visible && (!cut || ghost);
@@ -97,6 +103,21 @@ export class Panel {
     this.show(this.shapes.surface ? "surface" : "lattice");
   }
 
+  // Another surface of the same part, about the same centre.
+  replaceSurface({about, arrays}) {
+    const shape = new DrawnShape(about.surface, arrays, "surface");
+    shape.centre = this.shapes.surface.centre;
+    this.shapes.surface = shape;
+    this.facePart = arrays.face_part;
+    this.faceNumber = arrays.face_number;
+    for (const drawings of [this.drawings, this.restDrawings ?? {}]) {
+      if (drawings.surface) this.scene.remove(drawings.surface.group);
+      drawings.surface?.dispose();
+      delete drawings.surface;
+    }
+    this.show("surface");
+  }
+
   get shape() { return this.shapes[this.kind]; }
   get after() { return this.drawings[this.kind]; }
   get frames() { return this.shape.frames; }
@@ -114,6 +135,7 @@ export class Panel {
     this.unmark();
   }
 
+  partName(face) { return this.about.parts[this.partOfFace(face)]; }
   partOfFace(face) { return this.kind === "lattice" ? face : this.facePart[face]; }
 
   tintOf(shape) {
@@ -225,9 +247,10 @@ export class Panel {
 
   // "bracket/3", as options and scenes take it ("bracket/#3" where the file calls another face 3); the part alone on a lattice.
   faceName(face) {
-    const part = this.about.parts[this.partOfFace(face)];
+    const part = this.partName(face);
     if (this.kind === "lattice") return part;
     const number = String(this.faceNumber[face]);
+    if (number === "0") return {text: `${part.text}/carved`, odd: true};  // no face of the file
     const taken = Object.entries(this.about.face_names).some(
       ([other, name]) => name === number && Number(other) !== face && this.facePart[other] === this.facePart[face]);
     return {text: `${part.text}/${taken ? "#" : ""}${number}`, odd: part.odd};
@@ -265,6 +288,11 @@ export class Panel {
   placeOf({triangle, weights}) {
     const p = this.after.position.array;
     return new THREE.Vector3(...[0, 1, 2].map(c => this.mean(triangle, weights, point => p[3 * point + c])));
+  }
+  // Outward, of a triangle as it is drawn.
+  normalOf({triangle}) {
+    const [a, b, c] = [0, 1, 2].map(k => new THREE.Vector3().fromArray(this.after.position.array, 3 * this.shape.triangles[3 * triangle + k]));
+    return b.sub(a).cross(c.sub(a)).normalize();
   }
   mean(triangle, weights, of) {
     return weights.reduce((sum, weight, k) => sum + weight * of(this.shape.triangles[3 * triangle + k]), 0);
