@@ -32,6 +32,17 @@ void refuse_memory_of_places(const Body& body) {
                       note));
 }
 
+// At four cells across a bar of springs is some per cent stiffer than at eight, and its energy changes with
+// that.
+void refuse_springs(const Problem& problem, const std::vector<std::uint8_t>& changed) {
+  for (std::size_t p = 0; p < problem.models.size(); ++p)
+    if (changed[p] && problem.models[p] == Model::springs)
+      throw InputError(
+          fmt::format("part \"{}\" is of model \"springs\", which resists differently on another "
+                      "lattice; use model \"cells\"",
+                      problem.body.parts[p].name));
+}
+
 std::size_t count_elements(const Body& body, const std::vector<std::uint8_t>& changed) {
   std::size_t count = 0;
   for (std::size_t p = 0; p < body.parts.size(); ++p)
@@ -96,6 +107,7 @@ std::string ResolutionEvent::apply(EventContext& context) const try {
   refuse_memory_of_places(body);
   if (!context.fused.empty()) throw InputError("an earlier run or an event fused points of the body");
   const std::vector<std::uint8_t> parts = changed_parts(body);
+  refuse_springs(context.problem, parts);
   if (to_ == ResolutionChange::finer && !state.time) refuse_beyond_memory_if_finer(body, parts, origin_);
   std::vector<std::vector<Vec3>> fields{state.displacement, state.velocity};
   if (!context.settled.empty()) fields.push_back(context.settled);

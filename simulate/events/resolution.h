@@ -1,6 +1,6 @@
-// resolution: the lattice of a part becomes finer or coarser by 2 x 2 x 2 (Jansson and Vergeest, sections 3.1 and 7.4), moved and
-// moving as it is (simulate/events/lattice_resolution.h). Mass stays; momenta are seen to when supports are known again
-// (simulate/time/carried_motion.h). docs/reference/events.md
+// resolution: the lattice of a part becomes finer or coarser by 2 x 2 x 2 (Jansson and Vergeest, sections
+// 3.1 and 7.4), moved and moving as it is (simulate/events/lattice_resolution.h). Mass stays; momenta are
+// seen to when supports are known again (simulate/time/carried_motion.h). docs/reference/events.md
 #pragma once
 #include "simulate/events/event.h"
 #include "simulate/events/lattice_resolution.h"
@@ -11,8 +11,8 @@ class ResolutionEvent {
  public:
   static constexpr const char* name = "resolution";
   [[nodiscard]] static ResolutionEvent parse(TableReader& reader);
-  // Throws InputError: what the body remembers has no place on another lattice; there is no such part; it cannot be
-  // changed so.
+  // Throws InputError: what the body remembers has no place on another lattice; there is no such part; it
+  // cannot be changed so.
   [[nodiscard]] std::string apply(EventContext& context) const;
 
  private:

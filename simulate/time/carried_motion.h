@@ -1,7 +1,9 @@
-// What a part keeps when its lattice changes in a run: momentum and angular momentum, while its energy nearly stays.
+// What a part keeps when its lattice changes in a run: momentum and angular momentum, while its energy
+// nearly stays.
 //
-// Interpolation keeps neither exactly. A rigid velocity a + w x (x - c) of what no support leads, with the least a and w,
-// gives back what they lack; along axes where supports hold the part so that no such motion is left, they take it.
+// Interpolation keeps neither exactly. A rigid velocity a + w x (x - c) of what no support leads, with the
+// least a and w, gives back what they lack; along axes where supports hold the part so that no such motion
+// is left, they take it.
 #pragma once
 #include <string>
 #include <vector>
@@ -21,11 +23,12 @@ class CarriedMotion {
   // Before the change; `mass` (elements) kg.
   CarriedMotion(const Problem& problem, const State& state);
 
-  // Afterwards, of the same parts: adds the rigid velocities to `state`. `held` (elements): bits of the axes along which
-  // supports lead them; empty: none.
+  // Afterwards, of the same parts: adds the rigid velocities to `state`. `held` (elements): bits of the
+  // axes along which supports lead them; empty: none.
   void give_back(const Problem& problem, const std::vector<std::uint8_t>& held, State& state) const;
-  // Then: the change of the energy in words, of what is elastic and of the motion of matter against its mean; "" where there
-  // is none of it. Warns where it is more than 1 %; `origin`: of the event. Throws DivergedError: a cell is folded.
+  // Then: the change of the energy in words, of what is elastic and of the motion of matter against its
+  // mean; "" where there is none of it. Warns where it is more than 1 %; `origin`: of the event. Throws
+  // DivergedError: a cell is folded.
   [[nodiscard]] std::string change_of_energy(const Problem& problem, const State& state,
                                              const std::string& origin, Progress& progress) const;
 
