@@ -1,5 +1,6 @@
 // The event `resolution`: lattices, what is carried, momenta, energy, refusals. The swing of a whole program:
 // tests/programs/resolution_test.py.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <numeric>
@@ -95,7 +96,7 @@ TEST(LatticeResolution, MassStays) {
   EXPECT_NEAR(mass_of(changed_box(finer, ResolutionChange::coarser)), mass, 1e-13 * mass);
 }
 
-// Parabolas along every axis, and what is of first order in each of the three, where rows have three elements or more.
+// Parabolas along every axis, and what is of first order in each of the three, where rows have three elements.
 TEST(LatticeResolution, CurvedFieldsAreCarriedExactly) {
   const Body body = box_body(turned_box({4, 2, 3}, 1.0));
   const auto field = [](const Vec3& x) -> Vec3 {
@@ -156,14 +157,21 @@ TEST(LatticeResolution, RefusesWhatMakesNoLargerCells) {
 
 Scene changing_scene(const std::string& changes, const std::string& more = "",
                      const std::string& time = "2 ms") {
-  std::string text =
-      "material = \"gum\"\n[materials.gum]\nyoung = \"1 MPa\"\npoisson = 0.3\ndensity = \"1000 kg/m3\"\n";
-  text += more + "[run]\ntime = \"" + time + "\"\n";
-  return parse_scene(text + changes, "scene.toml");
+  return parse_scene(fmt::format(R"(material = "gum"
+[materials.gum]
+young = "1 MPa"
+poisson = 0.3
+density = "1000 kg/m3"
+{}[run]
+time = "{}"
+{})",
+                                 more, time, changes),
+                     "scene.toml");
 }
 
-std::string change_at(const std::string& at, const std::string& keys) {
-  return "[[event]]\nat = \"" + at + "\"\ndo = \"resolution\"\nchange = " + keys + "\n";
+// `keys`: the value of "change", and lines after it.
+std::string change_at(const char* at, const char* keys) {
+  return fmt::format("[[event]]\nat = \"{}\"\ndo = \"resolution\"\nchange = {}\n", at, keys);
 }
 
 Body thrown_bar(unsigned seed, double amplitude) {
@@ -209,9 +217,9 @@ TEST(Resolution, KeepsMassAndMomenta) {
   for (unsigned seed = 1; seed <= 4; ++seed) {
     SCOPED_TRACE(methods[seed - 1]);
     const bool implicit = seed == 4;
-    const Scene scene = changing_scene("method = \"" + std::string(methods[seed - 1]) + "\"\n" +
-                                           (implicit ? "step = \"50 us\"\n" : "") + changes,
-                                       "[damping]\ntime = \"" + std::string(damping[seed - 1]) + "\"\n");
+    const Scene scene = changing_scene(fmt::format("method = \"{}\"\n{}{}", methods[seed - 1],
+                                                   implicit ? "step = \"50 us\"\n" : "", changes),
+                                       fmt::format("[damping]\ntime = \"{}\"\n", damping[seed - 1]));
     const TimedCase made = run_timed(thrown_bar(seed, 5e-4), scene);
     expect_momenta_kept_at_events(made.history);
     if (!implicit) expect_momenta_kept(made.history, 1e-9);  // Newton's method leaves residual forces
@@ -233,7 +241,7 @@ std::vector<std::array<double, 2>> energies_at_events(const Csv& history) {
   return found;
 }
 
-// A bar of four cells across, bent and let go: under 1 % at every change, which the books enter as work of events.
+// A bar of four cells across, bent and let go: under 1 % at every change, which the books enter as work.
 TEST(Resolution, EnergyOfABentBarStays) {
   BoxOptions options;
   options.cells = {16, 4, 4};
@@ -241,18 +249,22 @@ TEST(Resolution, EnergyOfABentBarStays) {
   options.name = "bar";
   Body body = box_body(options);
   Progress quiet("test", Progress::Mode::quiet);
-  const std::string fix = "[[fix]]\nwhere = \"xmin\"\n";
-  (void)simulate(
-      body,
-      parse_scene("material = \"gum\"\n[materials.gum]\nyoung = \"1 MPa\"\npoisson = 0.3\ndensity = \"1000 "
-                  "kg/m3\"\n[[load]]\nwhere = \"xmax\"\nforce = [0, 0, \"30 mN\"]\n" +
-                      fix,
-                  "bend.toml"),
-      {}, quiet);
+  const char* bend = R"(material = "gum"
+[materials.gum]
+young = "1 MPa"
+poisson = 0.3
+density = "1000 kg/m3"
+[[load]]
+where = "xmax"
+force = [0, 0, "30 mN"]
+[[fix]]
+where = "xmin"
+)";
+  (void)simulate(body, parse_scene(bend, "bend.toml"), {}, quiet);
   const TimedCase made = run_timed(
       body, changing_scene(change_at("1 ms", "\"finer\"\npart = \"bar\"") + change_at("4 ms", "\"coarser\"") +
                                change_at("7 ms", "\"finer\"") + change_at("8 ms", "\"coarser\""),
-                           fix + "[damping]\ntime = \"200 us\"\n", "10 ms"));
+                           "[[fix]]\nwhere = \"xmin\"\n[damping]\ntime = \"200 us\"\n", "10 ms"));
   const auto found = energies_at_events(made.history);
   ASSERT_EQ(found.size(), 4u);
   double given = 0;
@@ -270,11 +282,19 @@ TEST(Resolution, LoadsMovesAndProbesGoOn) {
   options.cells = {6, 2, 2};
   options.spacing = Vec3::Constant(1e-2);
   options.name = "bar";
-  const std::string acts =
-      "[[move]]\nwhere = \"x0\"\ndisplacement = [\"2 mm\", 0, 0]\n[[load]]\nwhere = \"x1\"\nforce = [\"1 "
-      "N\", 0, "
-      "0]\n[damping]\nperiod = \"20 ms\"\nratio = 1\n[[probe]]\nname = \"end\"\nat = [\"60 mm\", \"5 mm\", "
-      "\"10 mm\"]\n";
+  const char* acts = R"([[move]]
+where = "x0"
+displacement = ["2 mm", 0, 0]
+[[load]]
+where = "x1"
+force = ["1 N", 0, 0]
+[damping]
+period = "20 ms"
+ratio = 1
+[[probe]]
+name = "end"
+at = ["60 mm", "5 mm", "10 mm"]
+)";
   const TimedCase plain = run_timed(box_body(options), changing_scene("", acts, "100 ms")),
                   finer = run_timed(box_body(options),
                                     changing_scene(change_at("10 ms", "\"finer\""), acts, "100 ms"));
@@ -289,7 +309,7 @@ TEST(Resolution, Refuses) {
     try {
       (void)run_timed(thrown_bar(1, 0), changing_scene(changes, more));
     } catch (const InputError& error) {
-      return error.where() + ": " + error.what();
+      return fmt::format("{}: {}", error.where(), error.what());
     }
     return std::string("accepted");
   };
@@ -302,8 +322,9 @@ TEST(Resolution, Refuses) {
   EXPECT_THAT(refused(finer, "contact = true\n"), ::testing::HasSubstr("contact"));
   EXPECT_THAT(refused(finer, "[plasticity]\nyield = \"1 kPa\"\n"), ::testing::HasSubstr("plasticity"));
   EXPECT_THAT(refused(finer, "[fracture]\nstrength = \"1 kPa\"\n"), ::testing::HasSubstr("fracture"));
+  EXPECT_THAT(refused(finer, "[parts.bar]\nmodel = \"springs\"\n"), ::testing::HasSubstr("springs"));
   EXPECT_THAT(refused(finer, "[parts.bar]\nrigid = true\n"), ::testing::HasSubstr("rigid"));
-  EXPECT_THAT(refused(finer + "[[event]]\nat = \"1 ms\"\ndo = \"renormalise\"\n"),
+  EXPECT_THAT(refused(fmt::format("{}[[event]]\nat = \"1 ms\"\ndo = \"renormalise\"\n", finer)),
               ::testing::HasSubstr("renormalise"));
   EXPECT_THAT(refused(change_at("0 s", "\"coarser\"") + change_at("1 ms", "\"coarser\"")),
               ::testing::HasSubstr("2 x 2 x 2"));
@@ -311,9 +332,9 @@ TEST(Resolution, Refuses) {
 
 // A box between two layers of elements holds one more on the finer lattice, which had moved.
 TEST(Resolution, RefusesSupportsThatHoldMoreThanBefore) {
-  const std::string fix =
-      "[[fix]]\nwhere = { box = { min = [\"-1 mm\", \"-1 mm\", \"-1 mm\"], max = [\"6 mm\", \"21 mm\", \"21 "
-      "mm\"] } }\n";
+  const char* fix = R"([[fix]]
+where = { box = { min = ["-1 mm", "-1 mm", "-1 mm"], max = ["6 mm", "21 mm", "21 mm"] } }
+)";
   try {
     (void)run_timed(thrown_bar(1, 0), changing_scene(change_at("1 ms", "\"finer\""), fix));
     FAIL();
