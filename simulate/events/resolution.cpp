@@ -1,3 +1,4 @@
+// The fields of the state go with the lattice; what else the body remembers is refused.
 #include "simulate/events/resolution.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// Sums over the elements of a part in their order, on one thread: changes are few.
 #include "simulate/time/carried_motion.h"
 
 #include <fmt/format.h>

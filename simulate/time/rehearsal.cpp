@@ -1,4 +1,4 @@
-// The lattices themselves are made: their cost is that of a few steps.
+// The lattices are made by the events themselves, on a copy.
 #include "simulate/time/rehearsal.h"
 
 #include <fmt/format.h>
