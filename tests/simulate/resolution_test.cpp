@@ -46,7 +46,7 @@ BoxOptions turned_box(std::array<int, 3> cells, double spacing) {
 }
 
 // With a notch and cells that are partly filled, so that rows end within it.
-Body notched_box(std::array<int, 3> cells = {5, 3, 4}) {
+Body notched_lattice(std::array<int, 3> cells = {5, 3, 4}) {
   BoxOptions options = turned_box(cells, 1e-3);
   options.fill = [](int i, int j, int k) { return i == 2 && j > 0 ? 0.0 : 1.0 - 0.1 * ((i + j + k) % 3); };
   return box_body(options);
@@ -72,7 +72,7 @@ TEST(LatticeResolution, FinerBoxIsTheBoxOfSmallerCells) {
 }
 
 TEST(LatticeResolution, CoarserGivesBackWhatWasFiner) {
-  const Body body = notched_box();
+  const Body body = notched_lattice();
   const State state = shaken(body, 2e-4, 3);
   Fields fields{state.displacement, state.velocity};
   Body finer = at_resolution(body, {1}, ResolutionChange::finer, fields);
@@ -89,7 +89,7 @@ TEST(LatticeResolution, CoarserGivesBackWhatWasFiner) {
 }
 
 TEST(LatticeResolution, MassStays) {
-  const Body body = notched_box({6, 4, 2});
+  const Body body = notched_lattice({6, 4, 2});
   const double mass = mass_of(body);
   EXPECT_NEAR(mass_of(changed_box(body, ResolutionChange::finer)), mass, 1e-13 * mass);
   const Body finer = changed_box(body, ResolutionChange::finer);
@@ -113,7 +113,7 @@ TEST(LatticeResolution, CurvedFieldsAreCarriedExactly) {
 }
 
 TEST(LatticeResolution, OtherPartsStay) {
-  Body body = notched_box();
+  Body body = notched_lattice();
   Fields fields{body.rest};
   const Body same = at_resolution(body, {0}, ResolutionChange::finer, fields);
   EXPECT_EQ(same.rest, body.rest);
