@@ -45,15 +45,15 @@ PartLattice taken_out(const Body& body, const Part& part, const std::vector<std:
 }
 
 // The edges of the cells along an axis, ascending, and of each element the next one in its row.
-struct Rows {
+struct ElementRows {
   std::vector<std::array<std::uint32_t, 2>> edges;
   std::vector<std::uint32_t> before, after;  // (elements)
 };
 
 // A row that forks, as at the end of a slit, ends there.
-Rows rows_along(const PartLattice& lattice, std::size_t axis) {
+ElementRows rows_along(const PartLattice& lattice, std::size_t axis) {
   const std::size_t bit = std::size_t{1} << axis;
-  Rows rows;
+  ElementRows rows;
   rows.edges.reserve(4 * lattice.cells.size());
   for (const auto& corners : lattice.cells)
     for (std::size_t a = 0; a < 8; ++a)
@@ -72,7 +72,7 @@ Rows rows_along(const PartLattice& lattice, std::size_t axis) {
   return rows;
 }
 
-Vec3 between(const std::vector<Vec3>& values, const Rows& rows, std::size_t edge) {
+Vec3 between(const std::vector<Vec3>& values, const ElementRows& rows, std::size_t edge) {
   const auto [low, high] = rows.edges[edge];
   const std::uint32_t before = rows.before[low], after = rows.after[high];
   const bool has_before = before < kTwoNeighbours, has_after = after < kTwoNeighbours;
@@ -85,7 +85,7 @@ Vec3 between(const std::vector<Vec3>& values, const Rows& rows, std::size_t edge
 
 // Cells become two along the axis.
 PartLattice split(PartLattice whole, std::size_t axis) {
-  const Rows rows = rows_along(whole, axis);
+  const ElementRows rows = rows_along(whole, axis);
   const auto first = static_cast<std::uint32_t>(whole.index.size());
   const std::size_t bit = std::size_t{1} << axis;
   PartLattice halves = std::move(whole);
