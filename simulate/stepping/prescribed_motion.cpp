@@ -54,6 +54,15 @@ double PrescribedMotion::farthest_off_path(const State& state) const {
   return farthest;
 }
 
+void PrescribedMotion::put_on_path(State& state) {
+  for (Entry& entry : entries_) {
+    for (int axis = 0; axis < 3; ++axis)
+      if (constraints_.mask[entry.element] >> axis & 1)
+        state.displacement[entry.element][axis] = path(entry.element, axis, state);
+    entry.displacement = state.displacement[entry.element];
+  }
+}
+
 void PrescribedMotion::settle(const State& state, const std::vector<Vec3>& supports) {
   for (Entry& entry : entries_) {
     entry.displacement = state.displacement[entry.element];

@@ -34,6 +34,8 @@ class PrescribedMotion {
 
   // m, the largest distance of a held component of `state` from its path.
   [[nodiscard]] double farthest_off_path(const State& state) const;
+  // Between two steps: puts them there.
+  void put_on_path(State& state);
 
   [[nodiscard]] const Body& body() const { return body_; }
 

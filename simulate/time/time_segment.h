@@ -122,6 +122,7 @@ class TimeSegment {
   [[nodiscard]] const Constraints& constraints() const { return constraints_; }
   // m, how far what follows a path is off it at most: what an event put there.
   [[nodiscard]] double farthest_off_path() const { return held_->farthest_off_path(state_); }
+  void put_on_path() { held_->put_on_path(state_); }
   [[nodiscard]] bool is_implicit() const { return euler_.has_value(); }
   // What was fused before it and has not broken.
   [[nodiscard]] std::vector<FusedPoint> fused() const { return joined_ ? joined_->left() : fused_; }

@@ -379,16 +379,18 @@ void TimedRun::bond_joined(std::size_t first, const State& state) {
 
 // The lattice is another one since `event`.
 void TimedRun::keep_motion(const CarriedMotion& carried, const Event& event) {
-  constexpr double kOff = 1e-6;  // of the smallest spacing
+  constexpr double kOff = 0.01;  // of the smallest spacing
   double spacing = std::numeric_limits<double>::infinity();
   for (const Part& part : body_.parts) spacing = std::min(spacing, part.lattice.spacing.minCoeff());
-  // A box that ends between elements may hold others now, which were free and have moved.
+  // A box that ends between elements may hold others now, which were free and have moved. A face that lay
+  // between elements was held by springs, which give way a little, and may go through elements now.
   if (const double off = segment_->farthest_off_path(); off > kOff * spacing)
     throw InputError(
         event.origin,
         fmt::format("resolution: on the new lattice a [[fix]] or [[move]] holds elements that were free "
                     "and are {} off: let it name a face, or a box that ends at elements of both lattices",
                     human_length(off)));
+  segment_->put_on_path();
   const Problem problem = timed_problem(body_, scene_, start_);
   segment_->change_velocities(
       [&](State& state) { carried.give_back(problem, segment_->constraints().mask, state); });
