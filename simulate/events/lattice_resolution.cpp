@@ -226,6 +226,8 @@ class NewBody {
  public:
   explicit NewBody(std::size_t fields) : fields_(fields) {}
   void append(const PartLattice& lattice);
+  // As it is, of any placement, with what is broken of it.
+  void append(const Body& old, const Part& part, const std::vector<std::vector<Vec3>>& fields);
   // Of the cells of `old` under each polygon those that came from them.
   Body finish(const Body& old, std::vector<std::vector<Vec3>>& fields);
 
@@ -258,6 +260,31 @@ void NewBody::append(const PartLattice& lattice) {
   part.element_end = static_cast<std::uint32_t>(body_.element_count());
   part.cell_end = static_cast<std::uint32_t>(body_.cell_count());
   body_.parts.push_back(std::move(part));
+}
+
+void NewBody::append(const Body& old, const Part& part, const std::vector<std::vector<Vec3>>& fields) {
+  Part moved = part;
+  moved.element_begin = static_cast<std::uint32_t>(body_.element_count());
+  moved.cell_begin = static_cast<std::uint32_t>(body_.cell_count());
+  const auto elements = [&](const auto& from, auto& to) {
+    to.insert(to.end(), from.begin() + part.element_begin, from.begin() + part.element_end);
+  };
+  body_.connections.resize(moved.element_begin, 0);
+  elements(old.connections, body_.connections);
+  elements(old.lattice_index, body_.lattice_index);
+  elements(old.piece, body_.piece);
+  elements(old.rest, body_.rest);
+  for (std::size_t f = 0; f < fields_.size(); ++f) elements(fields[f], fields_[f]);
+  for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c) {
+    replaced_.push_back({c, static_cast<std::uint32_t>(body_.cell_count())});
+    auto& corners = body_.cell_elements.emplace_back(old.cell_elements[c]);
+    for (std::uint32_t& e : corners) e = e - part.element_begin + moved.element_begin;
+    body_.fill.push_back(old.fill[c]);
+    body_.broken.push_back(old.broken[c]);
+  }
+  moved.element_end = static_cast<std::uint32_t>(body_.element_count());
+  moved.cell_end = static_cast<std::uint32_t>(body_.cell_count());
+  body_.parts.push_back(std::move(moved));
 }
 
 void NewBody::append_cells(const PartLattice& lattice, const std::vector<std::uint32_t>& number) {
@@ -342,10 +369,13 @@ Body at_resolution(const Body& body, const std::vector<std::uint8_t>& changed, R
                    std::vector<std::vector<Vec3>>& fields) {
   NewBody made(fields.size());
   for (std::size_t p = 0; p < body.parts.size(); ++p) {
-    if (changed[p]) refuse_part(body, body.parts[p]);
+    if (!changed[p]) {
+      made.append(body, body.parts[p], fields);
+      continue;
+    }
+    refuse_part(body, body.parts[p]);
     PartLattice lattice = taken_out(body, body.parts[p], fields);
-    if (changed[p]) lattice = to == ResolutionChange::finer ? split(std::move(lattice)) : merge(lattice);
-    made.append(lattice);
+    made.append(to == ResolutionChange::finer ? split(std::move(lattice)) : merge(lattice));
   }
   return made.finish(body, fields);
 }

@@ -6,9 +6,11 @@
 #include <numeric>
 
 #include "base/error.h"
+#include "formats/lattice/merge.h"
 #include "simulate/events/lattice_resolution.h"
 #include "simulate/matter/masses.h"
 #include "tests/simulate/box_body.h"
+#include "tests/simulate/centre_body.h"
 #include "tests/simulate/stepped.h"
 #include "tests/simulate/timed_case.h"
 
@@ -17,6 +19,7 @@ namespace {
 
 using testing::box_body;
 using testing::BoxOptions;
+using testing::centre_body;
 using testing::Csv;
 using testing::expect_books_close;
 using testing::expect_momenta_kept;
@@ -120,6 +123,37 @@ TEST(LatticeResolution, OtherPartsStay) {
   EXPECT_EQ(same.cell_elements, body.cell_elements);
   EXPECT_EQ(same.surface_cells, body.surface_cells);
   EXPECT_EQ(fields[0], body.rest);
+}
+
+// Beside one that changes: one with a broken cell, and one at centre placement, whose elements rest half a
+// voxel further and whose connections no cell gives.
+TEST(LatticeResolution, PartsBesideItStay) {
+  for (const ResolutionChange to : {ResolutionChange::finer, ResolutionChange::coarser}) {
+    BoxOptions second;
+    second.name = "second";
+    second.origin = Vec3(0, 0, 5);
+    Body body = box_body(turned_box({4, 2, 2}, 1e-3));
+    Body broken = box_body(second);
+    broken.broken[1] = 1;
+    derive_connections(broken);
+    const std::size_t first = body.element_count(), cells = body.cell_count();
+    append(body, broken);
+    append(body, centre_body());
+    Fields fields{body.rest};
+    const Body made = at_resolution(body, {1, 0, 0}, to, fields);
+    const auto tail = [](const auto& rows, std::size_t count) {
+      return std::decay_t<decltype(rows)>(rows.end() - static_cast<std::ptrdiff_t>(count), rows.end());
+    };
+    const std::size_t others = body.element_count() - first, other_cells = body.cell_count() - cells;
+    EXPECT_NE(made.element_count(), body.element_count());
+    EXPECT_EQ(tail(made.rest, others), tail(body.rest, others));
+    EXPECT_EQ(tail(fields[0], others), tail(body.rest, others));
+    EXPECT_EQ(tail(made.connections, others), tail(body.connections, others));
+    EXPECT_EQ(tail(made.piece, others), tail(body.piece, others));
+    EXPECT_EQ(tail(made.broken, other_cells), tail(body.broken, other_cells));
+    EXPECT_EQ(made.cell_elements.back()[7] - made.parts[1].element_begin,
+              body.cell_elements.back()[7] - body.parts[1].element_begin);
+  }
 }
 
 TEST(LatticeResolution, RefusesWhatMakesNoLargerCells) {
@@ -326,6 +360,7 @@ TEST(Resolution, Refuses) {
   EXPECT_THAT(refused(finer, "[parts.bar]\nrigid = true\n"), ::testing::HasSubstr("rigid"));
   EXPECT_THAT(refused(fmt::format("{}[[event]]\nat = \"1 ms\"\ndo = \"renormalise\"\n", finer)),
               ::testing::HasSubstr("renormalise"));
+  EXPECT_THAT(refused(change_at("2 ms", "\"finer\"")), ::testing::HasSubstr("before the end"));
   EXPECT_THAT(refused(change_at("0 s", "\"coarser\"") + change_at("1 ms", "\"coarser\"")),
               ::testing::HasSubstr("2 x 2 x 2"));
 }
