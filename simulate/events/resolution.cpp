@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/nearest_word.h"
+#include "base/resources.h"
 #include "base/units.h"
 #include "simulate/matter/stress.h"
 #include "simulate/result/memory_limit.h"
@@ -60,6 +61,7 @@ void refuse_beyond_memory_if_finer(const Body& body, const std::vector<std::uint
     elements +=
         changed[p] ? 8 * std::size_t{part.cell_end - part.cell_begin} : part.element_end - part.element_begin;
   }
+  check_elements(static_cast<double>(elements), origin);
   refuse_beyond_memory(moving_memory(static_cast<double>(elements)), human_count(elements) + " elements",
                        origin);
 }
@@ -80,10 +82,11 @@ ResolutionEvent ResolutionEvent::parse(TableReader& reader) {
     if (const SceneValue* given = reader.find(key))
       reader.fail(given->line,
                   fmt::format("resolution changes once, of a whole \"part\": leave \"{}\" out", key));
-  const SceneValue& to = reader.require("change", "\"finer\"");
-  if (to.text != "finer" && to.text != "coarser")
-    reader.fail(to.line, fmt::format("\"change\" = \"{}\"; choose \"finer\" or \"coarser\"", to.text));
-  made.to_ = to.text == "finer" ? ResolutionChange::finer : ResolutionChange::coarser;
+  const SceneValue& given = reader.require("change", "\"finer\"");
+  const std::string to = reader.text("change").value_or("");
+  if (to != "finer" && to != "coarser")
+    reader.fail(given.line, fmt::format("\"change\" = \"{}\"; choose \"finer\" or \"coarser\"", to));
+  made.to_ = to == "finer" ? ResolutionChange::finer : ResolutionChange::coarser;
   made.part_ = reader.text("part").value_or("");
   return made;
 }
@@ -113,6 +116,7 @@ std::string ResolutionEvent::apply(EventContext& context) const try {
   std::vector<std::vector<Vec3>> fields{state.displacement, state.velocity};
   if (!context.settled.empty()) fields.push_back(context.settled);
   Body made = at_resolution(body, parts, to_, fields);
+  if (!state.time) check_elements(static_cast<double>(made.element_count()), origin_);
   const std::string told = fmt::format("{}: {} elements became {}",
                                        part_.empty() ? "every part" : fmt::format("part \"{}\"", part_),
                                        count_elements(body, parts), count_elements(made, parts));
