@@ -15,8 +15,8 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kEnergyWarned = 0.01;  // change of the energy
-constexpr double kNoEnergy = 1e-12;     // of all kinetic energy: less than that is rounding
+constexpr double kEnergyWarned = 0.01;      // change of the energy
+constexpr double kKineticRounding = 1e-12;  // of all kinetic energy: less than that is rounding
 
 PartMomenta momenta_of(const Body& body, const Part& part, const State& state,
                        const std::vector<double>& mass) {
@@ -120,7 +120,7 @@ std::string CarriedMotion::change_of_energy(const Problem& problem, const State&
         fmt::format("{}: on the new lattice a cell is folded: change the resolution where the "
                     "body is deformed less",
                     origin));
-  if (!(internal_ > kNoEnergy * kinetic_)) return "";
+  if (!(internal_ > kKineticRounding * kinetic_)) return "";
   const double change = now / internal_ - 1;
   if (std::abs(change) > kEnergyWarned)
     progress.warn(
