@@ -15,9 +15,9 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kProgram = 27e6, kSmallProgram = 15e6;                          // bytes
-constexpr double kBlock = 100, kBlockOfSprings = 165;                            // bytes
-constexpr double kConnection = 350, kMovingElement = 520, kElementOfMode = 450;  // bytes
+constexpr double kProgram = 27e6, kSmallProgram = 15e6;    // bytes
+constexpr double kBlock = 100, kBlockOfSprings = 165;      // bytes
+constexpr double kConnection = 350, kElementOfMode = 450;  // bytes
 
 double connections_of(const Body& body) {
   return std::accumulate(body.connections.begin(), body.connections.end(), 0.0,
@@ -44,7 +44,7 @@ std::optional<MemoryNeeded> memory_needed(const Body& body, const Scene& scene) 
   const auto of = [](double bytes) { return MemoryNeeded{bytes, bytes}; };
   if (scene.run.time) {
     if (scene.run.method == TimeMethod::implicit_euler || scene.get<Contact>().on) return std::nullopt;
-    return of(kSmallProgram + kMovingElement * elements);
+    return of(moving_memory(elements));
   }
   if (model == Model::paper) return of(kSmallProgram + kConnection * connections_of(body));
   return of(kProgram + (model == Model::springs ? kBlockOfSprings : kBlock) * blocks +

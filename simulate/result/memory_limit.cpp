@@ -35,6 +35,11 @@ MemoryNeeded quadratic_memory(const Body& body, std::size_t held) {
   return needed;
 }
 
+double moving_memory(double elements) {
+  constexpr double kSmallProgram = 15e6, kMovingElement = 520;  // bytes
+  return kSmallProgram + kMovingElement * elements;
+}
+
 void refuse_beyond_memory(double bytes, const std::string& what, const std::string& scene) {
   const bool limited = std::isfinite(memory_limit());
   const double most = limited ? memory_limit() : available_memory();

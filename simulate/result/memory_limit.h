@@ -17,6 +17,9 @@ struct MemoryNeeded {
 // Of model `quadratic` with `held` cells that supports or bonds hold.
 [[nodiscard]] MemoryNeeded quadratic_memory(const Body& body, std::size_t held);
 
+// Of a timed run with explicit steps, without contact.
+[[nodiscard]] double moving_memory(double elements);
+
 // Throws InputError(scene, ...) where `bytes` are more than --max-memory, or than the memory that is free, by more than the
 // estimate may be off; `what` is told in brackets.
 void refuse_beyond_memory(double bytes, const std::string& what, const std::string& scene);

@@ -9,6 +9,7 @@
 #include "simulate/events/edit.h"
 #include "simulate/events/fuse.h"
 #include "simulate/events/renormalise.h"
+#include "simulate/events/resolution.h"
 
 namespace flexel::simulate {
 
@@ -55,6 +56,6 @@ struct EventList {
   }
 };
 
-using Events = EventList<Renormalise, Edit, Carve, Fuse, Add>;
+using Events = EventList<Renormalise, Edit, Carve, Fuse, Add, ResolutionEvent>;
 
 }  // namespace flexel::simulate

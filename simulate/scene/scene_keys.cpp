@@ -87,7 +87,7 @@ SceneKeyGroup event_keys() {
           "equilibrium, timed runs",
           "",
           {{e, "at", K::quantity, D::time, "required; without a time none", "when"},
-           {e, "do", K::text, {}, "required", "renormalise, edit, carve, fuse or add"},
+           {e, "do", K::text, {}, "required", "renormalise, edit, carve, fuse, add or resolution"},
            {e, "where", K::selection, {}, "everything", "of renormalise, edit, carve and fuse"},
            {e, "positions", K::text, {}, "\"now\"", "or \"rest\": the places that where means"},
            {e, "with", K::text, {}, "", "a part that the shapes of where move with"},
@@ -105,7 +105,9 @@ SceneKeyGroup event_keys() {
            {e, "stick", K::quantity, D::pressure, "0", "of edit: a traction more"},
            {e, "within", K::quantity, D::length, "required", "of fuse: over which distance"},
            {e, "body", K::text, {}, "required", "of add: a body's file"},
-           {e, "velocity", K::vector, D::velocity, "0", "of add: what it comes with"}}};
+           {e, "velocity", K::vector, D::velocity, "0", "of add: what it comes with"},
+           {e, "change", K::text, {}, "required", "of resolution: \"finer\" or \"coarser\""},
+           {e, "part", K::text, {}, "every part", "of resolution: a part's name"}}};
 }
 
 const char* name_of(ActsIn acts) {

@@ -1,6 +1,9 @@
 // Prescribed components: f = m a of the free advance, R = m (a of the path) - f.
 #include "simulate/stepping/prescribed_motion.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "base/parallel.h"
 
 namespace flexel::simulate {
@@ -39,6 +42,25 @@ void PrescribedMotion::impose(State& state, const std::vector<double>& mass, con
     }
     entry.displacement = u;
   });
+}
+
+double PrescribedMotion::farthest_off_path(const State& state) const {
+  double farthest = 0;
+  for (const Entry& entry : entries_)
+    for (int axis = 0; axis < 3; ++axis)
+      if (constraints_.mask[entry.element] >> axis & 1)
+        farthest = std::max(
+            farthest, std::abs(state.displacement[entry.element][axis] - path(entry.element, axis, state)));
+  return farthest;
+}
+
+void PrescribedMotion::put_on_path(State& state) {
+  for (Entry& entry : entries_) {
+    for (int axis = 0; axis < 3; ++axis)
+      if (constraints_.mask[entry.element] >> axis & 1)
+        state.displacement[entry.element][axis] = path(entry.element, axis, state);
+    entry.displacement = state.displacement[entry.element];
+  }
 }
 
 void PrescribedMotion::settle(const State& state, const std::vector<Vec3>& supports) {

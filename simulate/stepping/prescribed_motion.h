@@ -32,6 +32,11 @@ class PrescribedMotion {
   // Adds the supports' forces at the time before the last advance [N] (elements); 0 for free components.
   void add_forces(std::vector<Vec3>& forces) const;
 
+  // m, the largest distance of a held component of `state` from its path.
+  [[nodiscard]] double farthest_off_path(const State& state) const;
+  // Between two steps: puts them there.
+  void put_on_path(State& state);
+
   [[nodiscard]] const Body& body() const { return body_; }
 
  private:

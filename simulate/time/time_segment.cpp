@@ -440,6 +440,12 @@ void TimeSegment::slow(double factor) {
   for (const ActiveEffect& effect : effects_) effect->begin(state_);
 }
 
+void TimeSegment::change_velocities(const std::function<void(State&)>& change) {
+  const StopWaits whole;
+  change(state_);
+  for (const ActiveEffect& effect : effects_) effect->begin(state_);
+}
+
 bool TimeSegment::kicks() const {
   return !euler_ && !staged_ && scene_.run.method != TimeMethod::explicit_euler &&
          std::none_of(effects_.begin(), effects_.end(),

@@ -86,6 +86,8 @@ class TimeSegment {
 
   // Multiplies all velocities, but of what follows a path.
   void slow(double factor);
+  // Between two steps.
+  void change_velocities(const std::function<void(State&)>& change);
   // Loads and reactions, as of the last step.
   void tell_forces(SimulateResult& result) const;
   // Whether kick() can: velocities are those of half steps, and nothing but forces changes them.
@@ -117,6 +119,10 @@ class TimeSegment {
   [[nodiscard]] const std::vector<ActiveEffect>& effects() const { return effects_; }
   [[nodiscard]] const Stepper& stepper() const { return *stepper_; }
   [[nodiscard]] bool damps() const;  // internally
+  [[nodiscard]] const Constraints& constraints() const { return constraints_; }
+  // m, how far what follows a path is off it at most: what an event put there.
+  [[nodiscard]] double farthest_off_path() const { return held_->farthest_off_path(state_); }
+  void put_on_path() { held_->put_on_path(state_); }
   [[nodiscard]] bool is_implicit() const { return euler_.has_value(); }
   // What was fused before it and has not broken.
   [[nodiscard]] std::vector<FusedPoint> fused() const { return joined_ ? joined_->left() : fused_; }

@@ -4,9 +4,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <utility>
 
 #include "base/error.h"
@@ -14,6 +16,7 @@
 #include "base/files/output_file.h"
 #include "base/program/termination.h"
 #include "base/stop.h"
+#include "base/units.h"
 #include "formats/lattice/body_file.h"
 #include "formats/lattice/fused_points.h"
 #include "simulate/contact/pairs/stuck_places.h"
@@ -21,6 +24,7 @@
 #include "simulate/events/edit.h"
 #include "simulate/events/joined_bonds.h"
 #include "simulate/events/repeated_events.h"
+#include "simulate/events/resolution.h"
 #include "simulate/live/live_link.h"
 #include "simulate/matter/joined_parts.h"
 #include "simulate/models/damping_factors.h"
@@ -28,9 +32,11 @@
 #include "simulate/models/set_rest_shape.h"
 #include "simulate/probes/report.h"
 #include "simulate/scene/coming_parts.h"
+#include "simulate/time/carried_motion.h"
 #include "simulate/time/checkpoint.h"
 #include "simulate/time/dynamic_relaxation.h"
 #include "simulate/time/last_sound.h"
+#include "simulate/time/rehearsal.h"
 #include "simulate/time/series.h"
 #include "simulate/time/time_segment.h"
 
@@ -63,6 +69,7 @@ class TimedRun {
   void enter_half_step();
   void apply(std::size_t end);
   void bond_joined(std::size_t first, const State& state);
+  void keep_motion(const CarriedMotion& carried, const Event& event);
   [[nodiscard]] std::string unsure_fits() const;
   void warn_of_unsure_fits(const std::string& told = "");  // unless that is all
   void check();
@@ -118,6 +125,7 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
         fmt::format("[contact] \"overlap_time\" is {:.4g} s, the run {:.4g} s: what begins inside "
                     "something else is not out at its end",
                     contact.parting, duration_));
+  if (!options.resume) rehearse_resolution(body, scene_, LiveLink::wanted(scene_, options));
   start_.settled = settled_displacement(body);
   start_.fused = fused_points(body);
   if (!options.series.empty()) series_.emplace(options.series, options.compress);
@@ -369,6 +377,27 @@ void TimedRun::bond_joined(std::size_t first, const State& state) {
     progress_.say(fmt::format("what came is bonded where it touches, in {} points", bonds.size()));
 }
 
+// The lattice is another one since `event`.
+void TimedRun::keep_motion(const CarriedMotion& carried, const Event& event) {
+  constexpr double kOff = 0.01;  // of the smallest spacing
+  double spacing = std::numeric_limits<double>::infinity();
+  for (const Part& part : body_.parts) spacing = std::min(spacing, part.lattice.spacing.minCoeff());
+  // A box that ends between elements may hold others now, which were free and have moved. A face that lay
+  // between elements was held by springs, which give way a little, and may go through elements now.
+  if (const double off = segment_->farthest_off_path(); off > kOff * spacing)
+    throw InputError(
+        event.origin,
+        fmt::format("resolution: on the new lattice a [[fix]] or [[move]] holds elements that were free "
+                    "and are {} off: let it name a face, or a box that ends at elements of both lattices",
+                    human_length(off)));
+  segment_->put_on_path();
+  const Problem problem = timed_problem(body_, scene_, start_);
+  segment_->change_velocities(
+      [&](State& state) { carried.give_back(problem, segment_->constraints().mask, state); });
+  const std::string what = carried.change_of_energy(problem, segment_->state(), event.origin, progress_);
+  if (!what.empty()) progress_.say(fmt::format("at {:.4g} s {}", event.at, what));
+}
+
 // Events up to `end` happen now, and another act begins.
 void TimedRun::apply(std::size_t end) {
   const StopWaits whole;  // between two acts there is no state to save
@@ -389,6 +418,11 @@ void TimedRun::apply(std::size_t end) {
   start_.fresh = false;
   const std::string unsure = unsure_fits();
   segment_.reset();
+  const Event* resolution = nullptr;  // that changes in these events
+  for (std::size_t n = events_; n < end; ++n)
+    if (scene_.events[n].name == ResolutionEvent::name) resolution = &scene_.events[n];
+  std::optional<CarriedMotion> carried;
+  if (resolution) carried.emplace(timed_problem(body_, scene_, start_), state);
   const bool was_edited = edits_damping(body_);
   const std::size_t parts = body_.parts.size();
   body_.notes.erase(kFusedNote);  // events change start_.fused and the numbers of elements
@@ -412,6 +446,7 @@ void TimedRun::apply(std::size_t end) {
   }
   segment_.emplace(body_, scene_, options_, progress_, start_, std::move(state));
   sound_.keep(segment_->state());  // of the elements that there are now
+  if (carried) keep_motion(*carried, *resolution);
   if (body_.parts.size() > parts) warn_of_unsure_fits(unsure);
   if (!was_edited && edits_damping(body_) && !segment_->damps())
     progress_.warn("edit: the scene has no [damping] that \"damping\" could change");

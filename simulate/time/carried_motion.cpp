@@ -1,0 +1,133 @@
+// Sums over the elements of a part in their order, on one thread: changes are few.
+#include "simulate/time/carried_motion.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "base/error.h"
+#include "base/math/dense.h"
+#include "base/math/small_matrices.h"
+#include "simulate/matter/masses.h"
+#include "simulate/models/cells.h"
+
+namespace flexel::simulate {
+namespace {
+
+constexpr double kEnergyWarned = 0.01;      // change of the energy
+constexpr double kKineticRounding = 1e-12;  // of all kinetic energy: less than that is rounding
+
+PartMomenta momenta_of(const Body& body, const Part& part, const State& state,
+                       const std::vector<double>& mass) {
+  PartMomenta sum;
+  for (std::uint32_t e = part.element_begin; e < part.element_end; ++e) {
+    const Vec3 momentum = mass[e] * state.velocity[e];
+    sum.linear += momentum;
+    sum.angular += (body.rest[e] + state.displacement[e]).cross(momentum);
+  }
+  return sum;
+}
+
+// J: elastic, and kinetic but of the motion of all as one; all kinetic.
+std::array<double, 2> internal_and_kinetic(const Problem& problem, const State& state,
+                                           const std::vector<double>& mass) {
+  Vec3 momentum = Vec3::Zero();
+  double all = 0, kinetic = 0;
+  for (std::size_t e = 0; e < mass.size(); ++e) {
+    momentum += mass[e] * state.velocity[e];
+    kinetic += 0.5 * mass[e] * state.velocity[e].squaredNorm();
+    all += mass[e];
+  }
+  const Stencil none;
+  return {Cells(problem, none).energy(state) + kinetic - 0.5 * momentum.squaredNorm() / all, kinetic};
+}
+
+// Rigid motions of what is held nowhere.
+class FreeMotions {
+ public:
+  FreeMotions(const Body& body, const Part& part, const std::vector<std::uint8_t>& held, const State& state)
+      : body_(body), part_(part), held_(held), state_(state) {
+    for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
+      centre_ += place(e) / (part.element_end - part.element_begin);
+  }
+
+  // Velocity of an element (rows) of those of the part and its spin about its middle (columns).
+  [[nodiscard]] Eigen::Matrix<double, 3, 6> of(std::uint32_t e) const {
+    Eigen::Matrix<double, 3, 6> rows;
+    rows << Mat3::Identity(), -cross_matrix(place(e) - centre_);
+    for (Eigen::Index axis = 0; axis < 3; ++axis)
+      if (!held_.empty() && held_[e] >> axis & 1) rows.row(axis).setZero();
+    return rows;
+  }
+  // Of all with those momenta the least.
+  [[nodiscard]] Eigen::VectorXd with(const PartMomenta& momenta, const std::vector<double>& mass) const {
+    Eigen::MatrixXd inertia = Eigen::MatrixXd::Zero(6, 6);
+    for (std::uint32_t e = part_.element_begin; e < part_.element_end; ++e) {
+      const Eigen::Matrix<double, 3, 6> rows = of(e);
+      inertia += mass[e] * rows.transpose() * rows;
+    }
+    // Spins in units that make them as large as velocities.
+    const double reach = std::sqrt(inertia.diagonal().tail<3>().sum() / inertia.diagonal().head<3>().sum());
+    if (!std::isfinite(reach) || !(reach > 0)) return Eigen::VectorXd::Zero(6);
+    Eigen::VectorXd scale = Eigen::VectorXd::Ones(6), right(6);
+    scale.tail<3>().setConstant(1 / reach);
+    right << momenta.linear, momenta.angular - centre_.cross(momenta.linear);
+    const Eigen::MatrixXd scaled = scale.asDiagonal() * inertia * scale.asDiagonal();
+    return scale.cwiseProduct(solve_least_norm(scaled, scale.cwiseProduct(right)));
+  }
+
+ private:
+  [[nodiscard]] Vec3 place(std::uint32_t e) const { return body_.rest[e] + state_.displacement[e]; }
+
+  const Body& body_;
+  const Part& part_;
+  const std::vector<std::uint8_t>& held_;
+  const State& state_;
+  Vec3 centre_ = Vec3::Zero();
+};
+
+}  // namespace
+
+CarriedMotion::CarriedMotion(const Problem& problem, const State& state) {
+  const std::vector<double> mass = lumped_masses(problem);
+  for (const Part& part : problem.body.parts) momenta_.push_back(momenta_of(problem.body, part, state, mass));
+  const auto [internal, kinetic] = internal_and_kinetic(problem, state, mass);
+  internal_ = internal;
+  kinetic_ = kinetic;
+}
+
+void CarriedMotion::give_back(const Problem& problem, const std::vector<std::uint8_t>& held,
+                              State& state) const {
+  const Body& body = problem.body;
+  const std::vector<double> mass = lumped_masses(problem);
+  for (std::size_t p = 0; p < body.parts.size(); ++p) {
+    const Part& part = body.parts[p];
+    const FreeMotions motions(body, part, held, state);
+    const PartMomenta now = momenta_of(body, part, state, mass);
+    const Eigen::VectorXd lacking =
+        motions.with({momenta_[p].linear - now.linear, momenta_[p].angular - now.angular}, mass);
+    for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
+      state.velocity[e] += motions.of(e) * lacking;
+  }
+}
+
+std::string CarriedMotion::change_of_energy(const Problem& problem, const State& state,
+                                            const std::string& origin, Progress& progress) const {
+  const double now = internal_and_kinetic(problem, state, lumped_masses(problem))[0];
+  if (!std::isfinite(now))
+    throw DivergedError(
+        fmt::format("{}: on the new lattice a cell is folded: change the resolution where the "
+                    "body is deformed less",
+                    origin));
+  if (!(internal_ > kKineticRounding * kinetic_)) return "";
+  const double change = now / internal_ - 1;
+  if (std::abs(change) > kEnergyWarned)
+    progress.warn(
+        fmt::format("{}: the energy of the body changed by {:+.2g} % with its lattice: what it does "
+                    "takes smaller cells",
+                    origin, 100 * change));
+  return fmt::format("{:.4g} J of the body became {:.4g} J ({:+.2g} %)", internal_, now, 100 * change);
+}
+
+}  // namespace flexel::simulate

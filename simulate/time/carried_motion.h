@@ -1,0 +1,40 @@
+// What a part keeps when its lattice changes in a run: momentum and angular momentum, while its energy
+// nearly stays.
+//
+// Interpolation keeps neither exactly. A rigid velocity a + w x (x - c) of what no support leads, with the
+// least a and w, gives back what they lack; along axes where supports hold the part so that no such motion
+// is left, they take it.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "base/program/progress.h"
+#include "simulate/state/state.h"
+
+namespace flexel::simulate {
+
+// About the origin; velocities of the time of the places.
+struct PartMomenta {
+  Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();  // kg m/s, kg m^2/s
+};
+
+class CarriedMotion {
+ public:
+  // Before the change; `mass` (elements) kg.
+  CarriedMotion(const Problem& problem, const State& state);
+
+  // Afterwards, of the same parts: adds the rigid velocities to `state`. `held` (elements): bits of the
+  // axes along which supports lead them; empty: none.
+  void give_back(const Problem& problem, const std::vector<std::uint8_t>& held, State& state) const;
+  // Then: the change of the energy in words, of what is elastic and of the motion of matter against its
+  // mean; "" where there is none of it. Warns where it is more than 1 %; `origin`: of the event. Throws
+  // DivergedError: a cell is folded.
+  [[nodiscard]] std::string change_of_energy(const Problem& problem, const State& state,
+                                             const std::string& origin, Progress& progress) const;
+
+ private:
+  std::vector<PartMomenta> momenta_;   // (parts)
+  double internal_ = 0, kinetic_ = 0;  // J
+};
+
+}  // namespace flexel::simulate

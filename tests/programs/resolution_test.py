@@ -1,0 +1,144 @@
+"""A part whose lattice becomes finer and coarser in a timed run: a swing, the map of its frames, checkpoints, refusals."""
+
+import csv
+import math
+import re
+
+from harness import expect, expect_error, expect_ok, expect_only, main, run, write
+from shapes import binary_stl, box_triangles
+
+GUM = 'material = "gum"\n[materials.gum]\nyoung = "5 MPa"\npoisson = 0.3\ndensity = "1000 kg/m3"\n[[fix]]\nwhere = "xmin"\n'
+BEND = GUM + '[[load]]\nwhere = "xmax"\nforce = ["0 N", "0 N", "-0.15 N"]\n'
+SWING = GUM + """[damping]
+period = "14.5 ms"
+ratio = 0.02
+[[probe]]
+name = "tip"
+at = ["40 mm", "5 mm", "5 mm"]
+[run]
+time = "116 ms"
+history_every = "0.2 ms"
+frames = 10
+"""
+TIMES = [round(3.1 + 5.37 * n, 2) for n in range(20)]  # ms
+
+
+def changes(times, first="finer"):
+    other = {"finer": "coarser", "coarser": "finer"}
+    text = ""
+    for at in times:
+        text += f'[[event]]\nat = "{at} ms"\ndo = "resolution"\nchange = "{first}"\n'
+        first = other[first]
+    return text
+
+
+def bent_bar(size):
+    write("bar.stl", binary_stl(box_triangles((40, 10, 10))))
+    expect_ok(run("flexel-voxelize", "bar.stl", "--size", size, "-o", "bar.vtu"))
+    write("bend.toml", BEND)
+    expect_ok(run("flexel-simulate", "bend.toml", "bar.vtu", "-o", "bent.vtu"))
+
+
+def swing_of(history):
+    """Frequency [Hz] by the crossings of 0, and the damping ratio by the mean squares between them."""
+    rows = list(csv.reader(open(history)))
+    at = rows[0].index("tip z [m]")
+    path = [(float(row[0]), float(row[at])) for row in rows[1:]]
+    crossings = [t + (u - t) * a / (a - b) for (t, a), (u, b) in zip(path, path[1:]) if a * b < 0]
+    frequency = (len(crossings) - 1) / 2 / (crossings[-1] - crossings[0])
+    points = []
+    for begin, end in zip(crossings, crossings[1:]):
+        squares = [z * z for t, z in path if begin <= t < end]
+        points.append(((begin + end) / 2, 0.5 * math.log(sum(squares) / len(squares))))
+    middle = [sum(point[i] for point in points) / len(points) for i in (0, 1)]
+    slope = (sum((t - middle[0]) * (z - middle[1]) for t, z in points) / sum((t - middle[0])**2 for t, _ in points))
+    return frequency, -slope / (2 * math.pi * frequency)
+
+
+def test_a_swing_that_changes_ten_times_is_the_same():
+    """Finer and coarser ten times each: frequency and damping within 2 %, the energy within 1 % at every change."""
+    bent_bar("2.5 mm")
+    write("swing.toml", SWING)
+    write("change.toml", SWING + changes(TIMES))
+    expect_ok(run("flexel-simulate", "swing.toml", "bent.vtu", "-o", "same.vtu", "--history", "same.csv"))
+    told = expect_ok(run("flexel-simulate", "change.toml", "bent.vtu", "-o", "change.pvd", "--history", "change.csv", timeout=600)).err
+    shares = [float(share) for share in re.findall(r"J of the body became .* J \(([-+.e\d]+) %\)", told)]
+    expect(len(shares) == 20 and all(abs(share) < 1 for share in shares), told)
+    expect("warning" not in told, told)
+    (frequency, damping), (frequency_of_same, damping_of_same) = swing_of("change.csv"), swing_of("same.csv")
+    expect(abs(frequency / frequency_of_same - 1) < 0.02, f"{frequency} Hz, {frequency_of_same} Hz unchanged")
+    expect(abs(damping / damping_of_same - 1) < 0.02, f"damping {damping}, {damping_of_same} unchanged")
+
+
+def test_frames_are_mapped():
+    """Each frame has its own lattice and maps onto the part's surface; the last one as that of a run that did not change."""
+    bent_bar("5 mm")
+    short = SWING.replace("116 ms", "6 ms")
+    write("swing.toml", short)
+    write("change.toml", short + changes([2, 4]))
+    expect_ok(run("flexel-simulate", "swing.toml", "bent.vtu", "-o", "same.vtu"))
+    expect_ok(run("flexel-simulate", "change.toml", "bent.vtu", "-o", "c.pvd"))
+    cells = [int(re.search(rb'NumberOfCells="(\d+)"', open(f"c_{frame:05}.vtu", "rb").read())[1]) for frame in (0, 5, 10)]
+    expect(cells == [32, 256, 32], cells)
+    expect_ok(run("flexel-map", "c.pvd", "-o", "m_{frame}.obj"))
+    expect_ok(run("flexel-map", "same.vtu", "-o", "same.obj"))
+
+    def corners(file):
+        return [[float(x) for x in line.split()[1:]] for line in open(file) if line.startswith("v ")]
+
+    ends = {name: min(z for _, _, z in corners(name)) for name in ("m_00000.obj", "m_00005.obj", "m_00010.obj", "same.obj")}
+    expect(abs(ends["m_00010.obj"] - ends["same.obj"]) < 0.2, ends)
+
+
+def test_a_resumed_run_has_the_same_bytes():
+    """Stopped by a limit on its time between and after the changes, and resumed."""
+    bent_bar("5 mm")
+    write("scene.toml", SWING + changes([20, 50, 80]))
+    expect_ok(run("flexel-simulate", "scene.toml", "bent.vtu", "-o", "whole.vtu", "--history", "whole.csv"))
+    arguments = ["scene.toml", "bent.vtu", "-o", "out.vtu", "--history", "out.csv", "--checkpoint", "run.checkpoint"]
+    stops, limit = 0, 0.05  # s, longer until it is beyond the start of the program, which on a busy machine takes its time
+    for _ in range(40):
+        result = run("flexel-simulate", *arguments, "--timeout", f"{limit:.3f} s" if stops < 3 else "300 s", timeout=600)
+        if result.code == 0:
+            break
+        expect(result.code == 5, str(result))
+        if "--resume run.checkpoint" in result.err:
+            stops += 1
+            arguments = ["--resume", "run.checkpoint"]
+        else:
+            limit *= 1.25
+    expect(result.code == 0 and stops > 0, f"{stops} stops: {result}")
+    expect(open("out.vtu", "rb").read() == open("whole.vtu", "rb").read(), "another last state")
+    expect(open("out.csv", "rb").read() == open("whole.csv", "rb").read(), "another history")
+
+
+def test_refusals():
+    write("bar.stl", binary_stl(box_triangles((40, 10, 10))))
+    expect_ok(run("flexel-voxelize", "bar.stl", "--size", "5 mm", "-o", "bar.vtu"))
+    expect_ok(run("flexel-voxelize", "bar.stl", "--size", "5 mm", "--placement", "centre", "-o", "centre.vtu"))
+    finer, coarser = changes([1]), changes([1], "coarser")
+    for body, text, fragments in (
+        ("bar.vtu", SWING + finer.replace("finer", "larger"), ("scene.toml:", '"larger"', '"finer" or "coarser"')),
+        ("bar.vtu", SWING + finer + 'part = "bat"\n', ("scene.toml:", '"bat"', 'did you mean "bar')),
+        ("bar.vtu", SWING + finer + 'every = "1 ms"\n', ("scene.toml:", '"every"')),
+        ("bar.vtu", SWING + changes([1, 2], "coarser").replace('"finer"', '"coarser"'), ("2 x 2 x 2", "cannot be made coarser")),
+        ("bar.vtu", SWING + finer + "[contact]\nself = false\n", ("resolution", "contact")),
+        ("bar.vtu", SWING + finer + '[plasticity]\nyield = "1 MPa"\n', ("resolution", "plasticity")),
+        ("bar.vtu", SWING + finer + '[fracture]\nstrength = "1 MPa"\n', ("resolution", "fracture")),
+        ("bar.vtu", SWING + finer + '[[event]]\nat = "2 ms"\ndo = "renormalise"\n', ("resolution", "renormalise")),
+        ("bar.vtu", 'model = "springs"\n' + SWING + finer, ("resolution", "springs")),
+        ("centre.vtu", SWING + coarser, ("resolution", "paper")),
+        ("bar.vtu", GUM + '[[event]]\ndo = "resolution"\nchange = "finer"\n', ("resolution", "timed runs")),
+    ):
+        write("scene.toml", text)
+        expect_error(run("flexel-simulate", "scene.toml", body, "-o", "out.vtu"), "flexel-simulate", *fragments)
+        expect_only("bar.stl", "bar.vtu", "centre.vtu", "scene.toml")
+    write("scene.toml", SWING + "".join(changes([at]) for at in range(1, 6)))
+    expect_error(run("flexel-simulate", "scene.toml", "bar.vtu", "-o", "out.vtu", "--max-memory", "50 MB"), "flexel-simulate", "scene.toml:", "elements",
+                 "limit")
+    write("scene.toml", SWING + finer)
+    expect_error(run("flexel-simulate", "scene.toml", "bar.vtu", "-o", "out.vtu", "--max-elements", "100"), "flexel-simulate", "scene.toml:", "--max-elements")
+
+
+if __name__ == "__main__":
+    main(globals())
