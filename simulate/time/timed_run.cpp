@@ -465,7 +465,13 @@ void TimedRun::play() {
     if (over()) break;
     apply(end);
   }
+  const std::uint64_t before = clock_.steps;
+  const bool just_changed = events_ > 0 && !resumed;
   play_until(duration_, resumed);
+  if (just_changed && clock_.steps == before && !over())
+    progress_.warn(
+        "an [[event]] happens at the very end of the run and no step follows it: forces and the energy "
+        "balance of the end are not to be trusted; let [run] time be longer");
   if (relaxation_ && !relaxation_->done())
     throw DivergedError(relaxation_->failure(body_, segment_->state()));
   if (live_) live_summary_ = live_->finish(segment_->state());

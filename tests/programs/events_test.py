@@ -48,6 +48,14 @@ def test_a_renormalised_body_keeps_its_shape():
     expect(abs(longest(map_of["sprung"]) - longest(map_of["rest"])) > 0.01, "what was not frozen should spring back")
 
 
+def test_an_event_at_the_very_end_is_told():
+    body()
+    for at, told in (("2 ms", True), ("1.9 ms", False)):
+        scene(text=FREE + f'[[event]]\nat = "{at}"\ndo = "edit"\nwhere = "part"\nstiffness = 2.0\n')
+        result = expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu"))
+        expect(("at the very end of the run" in result.err) == told, f"{at}: {result}")
+
+
 def test_carving_half_takes_half_the_mass():
     inputs = [body(), scene(text=FREE + CARVE.format("19 mm"))]
     result = run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu", "--summary", "s.json", "--history", "h.csv")
