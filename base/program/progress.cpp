@@ -123,11 +123,11 @@ void Progress::stage(const std::string& name) {
 }
 
 void Progress::update(double share, const std::string& note) {
-  if (mode_ == Mode::silent) {
+  if (mode_ == Mode::silent || mode_ == Mode::quiet) {
     if (silent_update != nullptr) silent_update(*this, share, note);
     return;
   }
-  const bool listening = listener != nullptr && mode_ != Mode::quiet;
+  const bool listening = listener != nullptr;
   if ((mode_ != Mode::bar && !listening) || stage_.empty()) return;
   const double time = now();
   if (last_drawn_ >= 0 && time - last_drawn_ < kDrawInterval) return;

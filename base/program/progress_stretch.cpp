@@ -1,4 +1,4 @@
-// The stretches that live now are a stack; an update of a silent Progress goes to the one that it belongs to.
+// The stretches that live now are a stack; an update of a silent or quiet Progress goes to the one that it belongs to.
 #include "base/program/progress_stretch.h"
 
 #include "base/program/silent_updates.h"
@@ -7,11 +7,18 @@ namespace flexel {
 
 ProgressStretch* ProgressStretch::last_ = nullptr;
 
-ProgressStretch::ProgressStretch(Progress& whole, double from, double to)
-    : whole_(whole), from_(from), to_(to), inner_("", Progress::Mode::silent), before_(last_) {
+ProgressStretch::ProgressStretch(Progress& whole, double from, double to, const std::string& program,
+                                 Progress::Mode mode)
+    : whole_(whole), from_(from), to_(to), inner_(program, mode), before_(last_) {
   last_ = this;
   set_silent_update(&ProgressStretch::pass_on);
 }
+
+ProgressStretch::ProgressStretch(Progress& whole, double from, double to)
+    : ProgressStretch(whole, from, to, "", Progress::Mode::silent) {}
+
+ProgressStretch::ProgressStretch(Progress& whole, double from, double to, const std::string& warns_as)
+    : ProgressStretch(whole, from, to, warns_as, Progress::Mode::quiet) {}
 
 ProgressStretch::~ProgressStretch() {
   last_ = before_;

@@ -11,12 +11,15 @@ namespace flexel {
 class ProgressStretch {
  public:
   ProgressStretch(Progress& whole, double from, double to);
+  // Warnings of inner() are printed, as those of this program.
+  ProgressStretch(Progress& whole, double from, double to, const std::string& warns_as);
   ~ProgressStretch();
   ProgressStretch(const ProgressStretch&) = delete;
   ProgressStretch& operator=(const ProgressStretch&) = delete;
   [[nodiscard]] Progress& inner() { return inner_; }
 
  private:
+  ProgressStretch(Progress& whole, double from, double to, const std::string& program, Progress::Mode mode);
   static void pass_on(const Progress& inner, double share, const std::string& note);
   static ProgressStretch* last_;
   Progress& whole_;

@@ -38,6 +38,28 @@ TEST(Progress, ARunWithinARunMovesItsStretchOfTheStage) {
   EXPECT_EQ(heard.lines, std::vector<std::string>{"told"});
 }
 
+TEST(Progress, ARunWithinARunMayWarn) {
+  Heard heard;
+  Progress whole("flexel", Progress::Mode::lines);
+  whole.stage("bars");
+  wait_for_update();
+  ProgressStretch stretch(whole, 0.5, 1, "flexel");
+  stretch.inner().update(0.5);
+  stretch.inner().say("not told");
+  stretch.inner().warn("told");
+  EXPECT_EQ(heard.shares, (std::vector<double>{0, 0.75}));
+  EXPECT_EQ(heard.lines, std::vector<std::string>{"told"});
+}
+
+TEST(Progress, OfAQuietRunNoUpdateIsHeard) {
+  Heard heard;
+  Progress quiet("flexel", Progress::Mode::quiet);
+  quiet.stage("bars");
+  ProgressStretch stretch(quiet, 0, 1);
+  stretch.inner().update(0.5);
+  EXPECT_TRUE(heard.stages.empty());
+}
+
 TEST(Progress, OfASilentRunNothingIsHeard) {
   Heard heard;
   Progress silent("flexel", Progress::Mode::silent);
