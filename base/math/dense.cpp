@@ -2,12 +2,13 @@
 #include "base/math/dense.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <limits>
+
+#include "base/math/eigenvalues.h"
 
 namespace flexel {
 

@@ -1,7 +1,6 @@
 // Called a few times per part or element, never in a time step.
 #include "base/math/small_matrices.h"
-
-#include <Eigen/Eigenvalues>
+#include "base/math/eigenvalues.h"
 
 namespace flexel {
 

@@ -1,12 +1,13 @@
 // The rotation is the eigenvector of the greatest eigenvalue of a symmetric 4 x 4 matrix, as a quaternion.
 #include "cad/fit/rigid_motion.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <gp_Quaternion.hxx>
 #include <gp_Vec.hxx>
+
+#include "base/math/eigenvalues.h"
 
 namespace flexel::cad {
 

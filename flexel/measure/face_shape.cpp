@@ -9,7 +9,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <bitset>
 #include <cmath>
@@ -18,6 +17,7 @@
 
 #include "base/math/area_vector.h"
 #include "base/math/dense.h"
+#include "base/math/eigenvalues.h"
 
 namespace flexel::commands {
 namespace {

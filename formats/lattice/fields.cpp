@@ -1,13 +1,13 @@
 // Largest values are found in parallel by chunks that keep the first of equal ones.
 #include "formats/lattice/fields.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <sstream>
 
+#include "base/math/eigenvalues.h"
 #include "base/parallel.h"
 #include "formats/lattice/cell_moments.h"
 #include "formats/lattice/fragments_of_body.h"
@@ -240,7 +240,8 @@ std::optional<Vec3> displacement_on_surface(const Body& body, std::uint32_t poly
 
 double equivalent_strain(const Mat3& gradient) {
   if (!gradient.allFinite() || !(gradient.determinant() > 0)) return kNoStrain;
-  const Eigen::SelfAdjointEigenSolver<Mat3> solver(gradient.transpose() * gradient, Eigen::EigenvaluesOnly);
+  const Eigen::SelfAdjointEigenSolver<Mat3> solver(Mat3(gradient.transpose() * gradient),
+                                                   Eigen::EigenvaluesOnly);
   if (!(solver.eigenvalues().minCoeff() > 0)) return kNoStrain;
   const Vec3 logarithms = 0.5 * solver.eigenvalues().array().log();
   return std::sqrt(2.0 / 3.0) * (logarithms.array() - logarithms.mean()).matrix().norm();

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/math/eigenvalues.h"
 #include "base/parallel.h"
 #include "base/program/share_scope.h"
 #include "formats/part/topology.h"

@@ -13,7 +13,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -21,6 +20,7 @@
 
 #include "base/error.h"
 #include "base/human.h"
+#include "base/math/eigenvalues.h"
 #include "base/program/progress_stretch.h"
 #include "base/program/share_scope.h"
 #include "base/stop.h"

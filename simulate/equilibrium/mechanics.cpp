@@ -3,12 +3,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "base/math/eigenvalues.h"
 #include "base/parallel.h"
 #include "simulate/thermal/free_strain.h"
 

@@ -1,13 +1,13 @@
 // All sums are over the nodes in their order: a face has few beside the body.
 #include "simulate/followers/turning_load.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <map>
 #include <numbers>
 
 #include "base/math/dense.h"
+#include "base/math/eigenvalues.h"
 
 namespace flexel::simulate {
 namespace {

@@ -1,10 +1,10 @@
 // The laws but neo-Hooke's are written once, over a number type; here with double.
 #include "simulate/laws/elasticity.h"
 
-#include <Eigen/Eigenvalues>
 #include <limits>
 
 #include "base/math/dense.h"
+#include "base/math/eigenvalues.h"
 #include "simulate/laws/mooney_rivlin.h"
 #include "simulate/laws/neo_hooke_scalar.h"
 #include "simulate/laws/orthotropic.h"

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "base/math/eigenvalues.h"
+
 namespace flexel::simulate {
 namespace {
 

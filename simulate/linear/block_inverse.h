@@ -2,8 +2,9 @@
 #pragma once
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 #include <cmath>
+
+#include "base/math/eigenvalues.h"
 
 namespace flexel::simulate {
 

@@ -12,6 +12,7 @@
 #include <cassert>
 #include <optional>
 
+#include "base/math/eigenvalues.h"
 #include "base/program/share_scope.h"
 #include "simulate/linear/direct.h"
 #include "simulate/linear/level.h"
@@ -58,7 +59,7 @@ Grouping grouping(const LevelNodes& fine, const Aggregates& aggregates) {
 Mat3 free_directions(const Mat3& sum, const Mat3& own) {
   constexpr double kHeldShare = .5;
   if (sum.norm() < .1 * own.norm()) return Mat3::Identity();
-  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(.5 * (sum + sum.transpose()));
+  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(Mat3(.5 * (sum + sum.transpose())));
   Mat3 projector = Mat3::Identity();
   for (int c = 0; c < 3; ++c) {
     const Vec3 direction = eigen.eigenvectors().col(c);

@@ -1,8 +1,7 @@
 // Elements are looked at until none is left; each that is found has its neighbours looked at again without
 // it.
 #include "simulate/matter/coplanar_elements.h"
-
-#include <Eigen/Eigenvalues>
+#include "base/math/eigenvalues.h"
 
 #include "simulate/models/connections.h"
 

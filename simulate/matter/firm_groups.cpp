@@ -6,7 +6,6 @@
 // space of the sum of |d|^2 over every two groups at every shared element, d the difference of theirs.
 #include "simulate/matter/firm_groups.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <map>
@@ -14,6 +13,7 @@
 
 #include "base/disjoint_sets.h"
 #include "base/math/dense.h"
+#include "base/math/eigenvalues.h"
 
 namespace flexel::simulate {
 namespace {

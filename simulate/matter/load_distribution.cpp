@@ -1,10 +1,10 @@
 // Both are sums over the points in their order.
 #include "simulate/matter/load_distribution.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 
 #include "base/math/dense.h"
+#include "base/math/eigenvalues.h"
 
 namespace flexel::simulate {
 namespace {

@@ -1,13 +1,13 @@
 // Cells first, then elements; both in parallel, each written by one thread in a fixed order.
 #include "simulate/matter/stress.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <span>
 
 #include "base/math/dense.h"
 #include "base/math/distance.h"
+#include "base/math/eigenvalues.h"
 #include "base/parallel.h"
 #include "formats/lattice/cell_moments.h"
 #include "formats/lattice/fields.h"

@@ -1,11 +1,11 @@
 // One cell. Everything is written in H = F - I, so that strains of 1e-12 still have ten digits.
 #include "simulate/models/cell_model.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <limits>
 
 #include "base/math/dense.h"
+#include "base/math/eigenvalues.h"
 
 namespace flexel::simulate {
 namespace {

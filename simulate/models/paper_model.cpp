@@ -5,12 +5,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <limits>
 
 #include "base/error.h"
+#include "base/math/eigenvalues.h"
 #include "base/math/greatest.h"
 #include "base/parallel.h"
 #include "simulate/models/central_spring.h"

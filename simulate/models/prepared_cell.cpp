@@ -1,14 +1,13 @@
 // The tangent of one cell. The material's part is positive unless mu < lambda ln J; what can be negative
 // besides is the geometric part, by the stresses.
 #include "simulate/models/prepared_cell.h"
-
-#include <Eigen/Eigenvalues>
+#include "base/math/eigenvalues.h"
 
 namespace flexel::simulate {
 namespace {
 
 Mat3 positive_part(const Mat3& symmetric) {
-  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(0.5 * (symmetric + symmetric.transpose()));
+  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(Mat3(0.5 * (symmetric + symmetric.transpose())));
   return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() *
          eigen.eigenvectors().transpose();
 }

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/math/eigenvalues.h"
 #include "base/parallel.h"
 #include "base/units.h"
 

@@ -1,11 +1,11 @@
 // Eigenvalues of one cell per part, and an upper bound on how a deformed cell's grow.
 #include "simulate/models/stability.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "base/math/eigenvalues.h"
 #include "base/math/greatest.h"
 #include "base/parallel.h"
 #include "simulate/models/cells.h"

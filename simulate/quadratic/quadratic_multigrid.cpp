@@ -1,12 +1,12 @@
 // Prescribed components are 0 in every residual and correction.
 #include "simulate/quadratic/quadratic_multigrid.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <random>
 
+#include "base/math/eigenvalues.h"
 #include "base/parallel.h"
 #include "simulate/conditions/constraints.h"
 #include "simulate/linear/multigrid.h"

@@ -3,13 +3,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "base/error.h"
+#include "base/math/eigenvalues.h"
 #include "base/parallel.h"
 #include "simulate/input/scene_words.h"
 #include "simulate/linear/conjugate_gradients.h"

@@ -2,11 +2,11 @@
 #include "simulate/quadratic/quadratic_stress.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
+#include "base/math/eigenvalues.h"
 #include "base/parallel.h"
 #include "formats/lattice/fields.h"
 #include "simulate/matter/surface_samples.h"

@@ -25,24 +25,30 @@ except KeyboardInterrupt:
 """
 
 
+def interrupted(code):
+    """Exit code, output and error output of a child that gets SIGINT once it has begun."""
+    default = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # a job in the background ignores it
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=default) as child:
+        try:
+            check.assertEqual(child.stdout.readline(), b"begun\n")
+            child.send_signal(signal.SIGINT)
+            out, err = child.communicate(timeout=60)
+        finally:
+            child.kill()
+    return child.returncode, out, err
+
+
 def test_ctrl_c():
     module()
-    code = LONG.format(tests=os.path.dirname(os.path.abspath(__file__)))
-    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    check.assertEqual(child.stdout.readline(), b"begun\n")
-    child.send_signal(signal.SIGINT)
-    out, err = child.communicate(timeout=60)
-    check.assertEqual((child.returncode, out), (0, b"interrupted, and goes on\n"), err.decode())
+    code, out, err = interrupted(LONG.format(tests=os.path.dirname(os.path.abspath(__file__))))
+    check.assertEqual((code, out), (0, b"interrupted, and goes on\n"), err.decode())
 
 
 def test_ctrl_c_ends_a_script():
     module()
     code = LONG.format(tests=os.path.dirname(os.path.abspath(__file__))).replace("except KeyboardInterrupt", "except ZeroDivisionError")
-    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    check.assertEqual(child.stdout.readline(), b"begun\n")
-    child.send_signal(signal.SIGINT)
-    _, err = child.communicate(timeout=60)
-    check.assertEqual(child.returncode, -signal.SIGINT, err.decode())
+    code, _, err = interrupted(code)
+    check.assertEqual(code, -signal.SIGINT, err.decode())
     check.assertIn("KeyboardInterrupt", err.decode())
 
 

@@ -7,6 +7,8 @@
 #include <Eigen/Geometry>
 #include <random>
 
+#include "base/math/eigenvalues.h"
+
 namespace flexel::simulate {
 namespace {
 

@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 #include <random>
 
+#include "base/math/eigenvalues.h"
 #include "simulate/effects/damping.h"
 #include "simulate/stepping/explicit_barrier.h"
 #include "tests/simulate/stepped.h"
@@ -153,7 +154,7 @@ TEST(FoldBarrier, ARestShapeHasItsOwnThreshold) {
   const CellKind kind = gum_cell();
   const CellVectors u = pushed(kind, 0.03, 4);
   const Mat3 f = Mat3::Identity() + displacement_gradient(kind, u);
-  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(f.transpose() * f);
+  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(Mat3(f.transpose() * f));
   const Mat3 root = eigen.operatorInverseSqrt();
   std::array<Vec3, 4> hourglass;
   for (int m = 0; m < 4; ++m) {

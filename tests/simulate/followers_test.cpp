@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "base/error.h"
+#include "base/math/dense.h"
 #include "base/stop.h"
 #include "simulate/equilibrium/mechanics.h"
 #include "simulate/equilibrium/positive_tangent.h"
@@ -454,12 +455,10 @@ TEST(Followers, APaperFaceTurnsItsLoads) {
       now.push_back(body.position[e]);
     }
   ASSERT_EQ(rest.size(), 4u);
-  Eigen::Matrix<double, 3, 4> before, after;
-  for (int i = 0; i < 4; ++i) {
-    before.col(i) = rest[static_cast<std::size_t>(i)];
-    after.col(i) = now[static_cast<std::size_t>(i)];
-  }
-  const Mat3 turn = Eigen::umeyama(before, after, false).topLeftCorner<3, 3>();
+  const Vec3 middle = (now[0] + now[1] + now[2] + now[3]) / 4;
+  Mat3 products = Mat3::Zero();
+  for (std::size_t i = 0; i < 4; ++i) products += (now[i] - middle) * rest[i].transpose();
+  const Mat3 turn = nearest_rotation(products).rotation;
   EXPECT_GT(Eigen::AngleAxisd(turn).angle(), 0.5);
   EXPECT_LT((result.loads[0].force - turn * force).norm(), 5e-3 * force.norm());
   EXPECT_NEAR(result.loads[0].force.norm(), force.norm(), 1e-9 * force.norm());

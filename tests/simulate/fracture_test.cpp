@@ -2,13 +2,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <fstream>
 #include <limits>
 #include <numeric>
 #include <sstream>
 
 #include "base/error.h"
+#include "base/math/eigenvalues.h"
 #include "base/parallel.h"
 #include "simulate/models/cell_model.h"
 #include "simulate/scene/scene.h"

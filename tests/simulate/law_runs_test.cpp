@@ -2,10 +2,10 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include <Eigen/Dense>
 #include <cmath>
 #include <numbers>
 
+#include "base/math/dense.h"
 #include "simulate/laws/elasticity.h"
 #include "tests/simulate/law_materials.h"
 #include "tests/simulate/stepped.h"
@@ -78,7 +78,7 @@ TEST(LawRuns, OrthotropicBarDrawnAskew) {
   const SimulateResult result = at_equilibrium(body, kGrain + axes + kDrawnBar + drawn_by(force));
   Material material = testing::orthotropic_material();
   material.axes = Eigen::AngleAxisd(angle, Vec3::UnitZ()).toRotationMatrix();
-  const Mat6 compliance = moduli_at_rest(law_of(material)).inverse();
+  const Mat6 compliance = inverse_6(moduli_at_rest(law_of(material)));
   const Vec3 moved = result.probes[0].displacement;
   const double strain = force / kArea * compliance(0, 0);
   EXPECT_NEAR(moved.x() / (strain * kLength), 1, 1e-3);  // the law is not linear: strains of 1e-5

@@ -1,10 +1,10 @@
 // Factors of sparse symmetric matrices of many shapes, beside dense solutions.
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
 #include <random>
 
 #include "base/error.h"
+#include "base/math/dense.h"
 #include "base/stop.h"
 #include "simulate/linear/direct.h"
 
@@ -37,7 +37,7 @@ Eigen::MatrixXd full(const Sparse& lower) {
 // How far S = A^-1 by `solver` is from the inverse of `matrix`, of its own size; of one column.
 double off(const DirectSolver& solver, const Eigen::MatrixXd& matrix) {
   Eigen::VectorXd x = Eigen::VectorXd::LinSpaced(matrix.rows(), -1, 2);
-  const Eigen::VectorXd wanted = matrix.partialPivLu().solve(x);
+  const Eigen::VectorXd wanted = solve_dense(matrix, x);
   solver.solve(x.data());
   return (x - wanted).norm() / wanted.norm();
 }

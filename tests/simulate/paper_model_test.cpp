@@ -5,12 +5,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <limits>
 #include <random>
 
 #include "base/error.h"
+#include "base/math/eigenvalues.h"
 #include "simulate/effects/gravity.h"
 #include "tests/sanitized.h"
 #include "tests/simulate/derivatives.h"

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
-#include <Eigen/LU>
 #include <cstring>
 #include <mutex>
 #include <random>
@@ -329,9 +328,11 @@ TEST(QuadraticKernels, InverseFactors) {
   std::vector<Eigen::MatrixXd> wanted;
   std::vector<double> lower(quadratic_kernel::kFactorSize * kWidth, 0);
   for (std::size_t lane = 0; lane < kCount; ++lane) {
-    const Eigen::MatrixXd half = Eigen::MatrixXd::Random(81, 81),
-                          scale = Eigen::VectorXd::LinSpaced(81, 1, 1e6).asDiagonal();
-    Eigen::MatrixXd matrix = scale * (half * half.transpose() + Eigen::MatrixXd::Identity(81, 81)) * scale;
+    const Eigen::MatrixXd half = Eigen::MatrixXd::Random(81, 81);
+    const Eigen::VectorXd scale = Eigen::VectorXd::LinSpaced(81, 1, 1e6);
+    Eigen::MatrixXd matrix = half * half.transpose();
+    matrix.diagonal().array() += 1;
+    matrix = (scale.asDiagonal() * matrix * scale.asDiagonal()).eval();
     if (lane == kBad) matrix(40, 40) = -1;
     wanted.push_back(matrix);
     for (std::size_t r = 0; r < 81; ++r)
@@ -351,9 +352,10 @@ TEST(QuadraticKernels, InverseFactors) {
         EXPECT_EQ(found[lane].step[0], 0);
         continue;
       }
-      const Eigen::MatrixXd t = written_out(found[lane]),
-                            scale = wanted[lane].diagonal().cwiseSqrt().asDiagonal();
-      const Eigen::MatrixXd unit = scale.inverse() * wanted[lane] * t.transpose() * t * scale;
+      const Eigen::MatrixXd t = written_out(found[lane]), inverse = t.transpose() * t,
+                            product = wanted[lane] * inverse;
+      const Eigen::VectorXd scale = wanted[lane].diagonal().cwiseSqrt();
+      const Eigen::MatrixXd unit = scale.cwiseInverse().asDiagonal() * product * scale.asDiagonal();
       EXPECT_LT((unit - Eigen::MatrixXd::Identity(81, 81)).norm(), 0.05) << each.name;
     }
     if (first.empty()) first = found;

@@ -3,11 +3,11 @@
 
 #include <gmock/gmock.h>
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <random>
 
 #include "base/error.h"
+#include "base/math/eigenvalues.h"
 #include "simulate/models/stability.h"
 #include "tests/simulate/stepped.h"
 

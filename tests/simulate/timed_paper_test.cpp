@@ -1,11 +1,11 @@
 // Model `paper` in timed runs: damping as a derivative, the bound on the step, momenta, books, wave speed.
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <random>
 
 #include "base/error.h"
+#include "base/math/eigenvalues.h"
 #include "simulate/effects/damping.h"
 #include "simulate/effects/gravity.h"
 #include "simulate/equilibrium/mechanics.h"

@@ -1,9 +1,9 @@
 // Position by the weights of the carrying elements, normal by the cell's mean deformation gradient.
 #include "simulate/contact/points/contact_surface.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
+#include "base/math/eigenvalues.h"
 #include "base/parallel.h"
 #include "simulate/kernels/chunk_layout.h"
 #include "simulate/matter/masses.h"

@@ -1,0 +1,12 @@
+#include "base/math/eigenvalues.h"
+
+namespace Eigen {
+
+template FLEXEL_SYMMETRIC_SOLVER(Matrix3d);
+template FLEXEL_SYMMETRIC_SOLVER(Matrix4d);
+template FLEXEL_SYMMETRIC_SOLVER(Matrix6d);
+template FLEXEL_SYMMETRIC_SOLVER(Matrix9d);
+template FLEXEL_SYMMETRIC_SOLVER(Matrix24d);
+template FLEXEL_SYMMETRIC_SOLVER(MatrixXd);
+
+}  // namespace Eigen
