@@ -1,6 +1,8 @@
 // The stretches that live now are a stack; an update of a silent or quiet Progress goes to the one that it belongs to.
 #include "base/program/progress_stretch.h"
 
+#include <algorithm>
+
 #include "base/program/silent_updates.h"
 
 namespace flexel {
@@ -25,9 +27,11 @@ ProgressStretch::~ProgressStretch() {
 }
 
 void ProgressStretch::pass_on(const Progress& inner, double share, const std::string& note) {
-  for (const ProgressStretch* each = last_; each != nullptr; each = each->before_)
-    if (&each->inner_ == &inner)
-      return each->whole_.update(each->from_ + share * (each->to_ - each->from_), note);
+  for (ProgressStretch* each = last_; each != nullptr; each = each->before_) {
+    if (&each->inner_ != &inner) continue;
+    each->furthest_ = std::max(each->furthest_, std::min(share, 1.0));
+    return each->whole_.update(each->from_ + each->furthest_ * (each->to_ - each->from_), note);
+  }
 }
 
 }  // namespace flexel

@@ -6,8 +6,8 @@
 
 namespace flexel {
 
-// What is told to inner() is not printed, but its updates move the stage of `whole` from one share to another. Lives
-// no longer than `whole`; not thread-safe, as Progress.
+// What is told to inner() is not printed, but its updates move the stage of `whole` from one share to another, never
+// back: a stage of inner() that begins anew waits. Lives no longer than `whole`; not thread-safe, as Progress.
 class ProgressStretch {
  public:
   ProgressStretch(Progress& whole, double from, double to);
@@ -23,7 +23,7 @@ class ProgressStretch {
   static void pass_on(const Progress& inner, double share, const std::string& note);
   static ProgressStretch* last_;
   Progress& whole_;
-  double from_, to_;
+  double from_, to_, furthest_ = 0;
   Progress inner_;
   ProgressStretch* before_;
 };

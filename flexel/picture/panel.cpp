@@ -139,13 +139,17 @@ void draw_body_surface(const Body& body, const PictureOptions& options, const Co
                        Progress& progress, Panel& panel) {
   mapping::MapOptions how;
   how.method = mapping::default_method(body);
-  constexpr double kFirst = 0.5;  // of the time
+  constexpr double kFirst = 0.4, kLooked = 0.6;  // of the time
   const mapping::MapResult mapped = [&] {
     const ShareScope first(progress, 0, kFirst);
     return map_surface(body, how, progress);
   }();
-  if (const std::optional<Body> split = split_where_coarse(body, mapped, progress)) {
-    const ShareScope second(progress, kFirst, 1);
+  const std::optional<Body> split = [&] {
+    const ShareScope looking(progress, kFirst, kLooked);
+    return split_where_coarse(body, mapped, progress);
+  }();
+  if (split) {
+    const ShareScope second(progress, kLooked, 1);
     return draw_mapped(*split, map_surface(*split, how, progress), options, by, panel);
   }
   draw_mapped(body, mapped, options, by, panel);
