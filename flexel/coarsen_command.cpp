@@ -76,12 +76,20 @@ int coarsen_command(int argc, char** argv) {
     throw InputError(fmt::format("--times: a whole number from 1 to {}", kMostTimes));
   check_outputs({{output, true}}, {input}, force);
   Progress progress("flexel", quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
+  progress.stage("read");
   Body body = read_body(input);
   if (body.parts.empty() || body.element_count() == 0)
     throw InputError(input == "-" ? "stdin" : input, "the body has no elements");
   const std::string before = elements_of(body);
-  for (int n = 0; n < times; ++n) body = coarser_body(body, input == "-" ? "stdin" : input);
+  progress.stage("coarsen");
+  double done = 0;
+  for (int n = 0; n < times; ++n) {
+    body = coarser_body(body, input == "-" ? "stdin" : input);
+    done += (1 - done) * 7 / 8;  // an eighth of the elements is left for the next
+    progress.update(done);
+  }
   progress.say(fmt::format("{} became {}", before, elements_of(body)));
+  progress.stage("write");
   write_body(body, output, {.compress = compress});
   progress.finish();
   return kExitDone;

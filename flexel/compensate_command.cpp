@@ -12,6 +12,7 @@
 #include "base/math/area_vector.h"
 #include "base/parallel.h"
 #include "base/program/brief_output.h"
+#include "base/program/progress_stretch.h"
 #include "base/program/termination.h"
 #include "base/stop.h"
 #include "base/units.h"
@@ -34,7 +35,8 @@ namespace {
 
 constexpr double kStopsAt = 1e-3, kAllowed = 0.01;  // of the largest displacement: to stop at; to be told of
 constexpr int kMostIterations = 12;
-constexpr double kOwnLattice = 0.8;   // spacing of the check, of that of the iteration
+constexpr double kOwnLattice = 0.8;                 // spacing of the check, of that of the iteration
+constexpr double kFirstRun = 0.1, kIterated = 0.8;  // of the time, at most
 constexpr double kLeastFacing = 0.1;  // cosine between a face as it is to be and as it is to be made
 
 struct CompensateArguments {
@@ -72,7 +74,8 @@ class Compensation {
   void find(Surface wanted) {
     wanted_ = std::move(wanted);
     made_ = wanted_.vertices;
-    run(kIteration);
+    progress_.stage("compensate");
+    run(kIteration, 0, kFirstRun);
     if (job_.voxelize.count || !job_.voxelize.size) {
       job_.voxelize.count.reset();
       job_.voxelize.size = std::cbrt(body_.parts.front().lattice.spacing.prod());
@@ -83,7 +86,7 @@ class Compensation {
     if (!(largest_ > 0)) throw InputError("the scene moves nothing: there is nothing to compensate");
     iterate();
     field_ = body_;
-    run(kOwnLattice);
+    run(kOwnLattice, kIterated, 1);
     pass_on(warnings_);
     check_ = rest();
     refuse_worse(check_);
@@ -141,26 +144,34 @@ class Compensation {
  private:
   static constexpr double kIteration = 1;
 
-  // The part as it is made now, on a lattice whose spacing is `finer` times the usual one, under the scene.
-  void run(double finer) {
+  // The part as it is made now, on a lattice whose spacing is `finer` times the usual one, under the scene; `from`, `to`:
+  // of the whole time.
+  void run(double finer, double from, double to) {
+    constexpr double kVoxelized = 0.1, kSimulated = 0.9;  // of the run's time
+    const auto at = [&](double share) { return from + share * (to - from); };
     check_stop();
     Surface surface = wanted_;
     surface.vertices = made_;
     voxelize::VoxelizeOptions options = job_.voxelize;
     if (options.size) *options.size *= finer;
-    voxelize::VoxelizeResult voxels = voxelize::voxelize(std::move(surface), options, quiet_);
+    voxelize::VoxelizeResult voxels = [&] {
+      ProgressStretch stretch(progress_, at(0), at(kVoxelized), kProgram);
+      return voxelize::voxelize(std::move(surface), options, stretch.inner());
+    }();
     if (!reported_) report(voxels);
     HeldWarnings held;  // of a run that fails they are printed
+    ProgressStretch simulating(progress_, at(kVoxelized), at(kSimulated), kProgram);
     Body body = std::move(voxels.body);
     Job job = job_;
     add_actions(job, body);
     simulate::SimulateOptions how;
     how.threads = arguments_.threads;
     how.estimate = how.stress = false;
-    (void)simulate::simulate(body, job.scene, how, quiet_);
+    (void)simulate::simulate(body, job.scene, how, simulating.inner());
     mapping::MapOptions map;
     use_field(body, arguments_.map, map);
-    mapping::MappedPart mapped = map_part(body, map, {}, quiet_);
+    ProgressStretch placing(progress_, at(kSimulated), at(1), kProgram);
+    mapping::MappedPart mapped = map_part(body, map, {}, placing.inner());
     moved_ = std::move(mapped.result.displacement);
     body_ = std::move(body);
     last_ = std::move(mapped.result);
@@ -190,27 +201,36 @@ class Compensation {
     if (!finer) return;
     wanted_ = finer->surface;
     made_ = wanted_.vertices;
-    run(kIteration);
+    run(kIteration, kFirstRun, kFirstRun);
   }
 
+  // How much of the way to kStopsAt is gone when so much remains [m].
+  [[nodiscard]] double gone(double remains) const {
+    return std::clamp(std::log(remains / largest_) / std::log(kStopsAt), 0.0, 1.0);
+  }
+
+  // Each iteration is thought to go as far as the last.
   void iterate() {
-    progress_.stage("compensate");
-    double before = largest_;
+    double before = largest_, done = 0, step = 0.3;
+    const auto at = [](double share) { return kFirstRun + share * (kIterated - kFirstRun); };
     std::vector<Vec3> best = made_;
     for (iterations_ = 1; iterations_ <= kMostIterations; ++iterations_) {
       for (std::size_t v = 0; v < made_.size(); ++v) made_[v] -= made_[v] + moved_[v] - wanted_.vertices[v];
       refuse_folded();
-      run(kIteration);
+      const double expected = done + std::min(step, (1 - done) / 2);
+      run(kIteration, at(done), at(expected));
       const Rest left = rest();
       const double now = left.largest;
       if (iterations_ == 1 && !(now < before)) {
         pass_on(warnings_);
         refuse_worse(left);
       }
-      progress_.update(0.9 * iterations_ / kMostIterations, fmt::format("{} remain", human_length(now)));
+      step = std::max(gone(now) - gone(before), 1.0 / kMostIterations);
+      done = std::max(expected, gone(now));
+      progress_.update(at(done), fmt::format("{} remain", human_length(now)));
       if (now >= before) {  // what is left is that of the lattices
         made_ = best;
-        run(kIteration);
+        run(kIteration, at(done), at(1));
         return;
       }
       best = made_;
@@ -258,7 +278,8 @@ class Compensation {
   const CompensateArguments& arguments_;
   Job job_;
   Progress& progress_;
-  Progress quiet_{"flexel", Progress::Mode::quiet};
+  static constexpr const char* kProgram = "flexel";
+  Progress quiet_{kProgram, Progress::Mode::quiet};
   std::vector<std::string> warnings_;  // of the last run
   bool reported_ = false;
   Surface wanted_;

@@ -16,6 +16,7 @@
 #include "base/program/arguments.h"
 #include "base/program/brief_output.h"
 #include "base/program/progress.h"
+#include "base/program/share_scope.h"
 #include "base/program/termination.h"
 #include "base/units.h"
 #include "flexel/commands.h"
@@ -75,7 +76,12 @@ Known look_at(Surface& surface) {
       }
     part.topology = topology(corners[p], welded);
   }
-  std::vector<voxelize::MeasuredPart> healed = voxelize::heal_and_measure(surface);
+  constexpr double kSorted = 0.2, kMeasured = 0.8;  // of the time
+  tell_share(kSorted);
+  std::vector<voxelize::MeasuredPart> healed = [&] {
+    const ShareScope measuring(kSorted, kMeasured);
+    return voxelize::heal_and_measure(surface);
+  }();
   for (std::size_t p = 0; p < parts.size(); ++p) parts[p].healed = std::move(healed[p]);
   known.shapes = face_shapes(surface);
   known.numbers = face_numbers(surface);
@@ -369,8 +375,15 @@ int info_command(int argc, char** argv) {
   }
   for (const std::string& line : size_warnings(surface)) progress.warn(line);
   progress.stage("measure");
-  const Known known = look_at(surface);
-  if (!thickness.empty()) write_thickness(surface, thickness);
+  const double looked_at = thickness.empty() ? 1 : 0.1;  // of the time
+  const Known known = [&] {
+    const ShareScope looking(progress, 0, looked_at);
+    return look_at(surface);
+  }();
+  if (!thickness.empty()) {
+    const ShareScope casting_rays(progress, looked_at, 1);
+    write_thickness(surface, thickness);
+  }
   progress.finish();
   print(json ? info_json(surface, known) : printable_lines(info_text(surface, known)));
   return kExitDone;

@@ -134,13 +134,18 @@ class Run {
         options_(options),
         progress_(progress),
         fragments_(find_fragments(body)),
-        problem_(equilibrium_problem(body_, scene, fragments_, unsupported_)) {}
+        problem_(equilibrium_problem(body_, scene, fragments_, unsupported_)) {
+    constexpr double kPosed = 0.2;
+    prepared(kPosed);
+  }
 
   SimulateResult operator()();
   // m: the largest displacement of the first linear answer, where that is one from rest; else 0.
   [[nodiscard]] double linear_reach() const { return linear_reach_; }
 
  private:
+  // So much of what goes before the search for the equilibrium is done.
+  void prepared(double share) { progress_.update(share * kBeforeSearch, "preparing"); }
   EquilibriumResult solve(Mechanics& mechanics);
   void warn_of_buckling(Mechanics& mechanics);
   [[nodiscard]] std::optional<NearStart> coarse_equilibrium(Progress& stretch);
@@ -257,6 +262,8 @@ SimulateResult Run::operator()() {
   report_strays(fragments_, result, progress_);
   report_unsupported(unsupported_, result, progress_);
   Mechanics mechanics(problem_, std::move(effects));
+  constexpr double kAssembled = 0.65;
+  prepared(kAssembled);
   state_.displacement = where_to_begin(body_);
   const bool from_rest = std::all_of(state_.displacement.begin(), state_.displacement.end(),
                                      [](const Vec3& u) { return u.isZero(0); });

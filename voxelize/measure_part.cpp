@@ -1,6 +1,7 @@
 // Each part is healed as for a lattice, then measured.
 #include "voxelize/measure_part.h"
 
+#include "base/program/share_scope.h"
 #include "voxelize/classify/overlap.h"
 #include "voxelize/heal/heal.h"
 #include "voxelize/heal/outward.h"
@@ -14,7 +15,9 @@ std::vector<MeasuredPart> heal_and_measure(Surface& surface, int rays) {
   face_outward(healed, surface);
   std::vector<MeasuredPart> result(healed.size());
   const int lines = wall_lines(rays, healed.size());
+  constexpr double kHealed = 0.5;  // of the time
   for (std::size_t p = 0; p < healed.size(); ++p) {
+    tell_share(kHealed + (1 - kHealed) * static_cast<double>(p) / static_cast<double>(healed.size()));
     const PartMesh& mesh = healed[p].mesh;
     result[p].healing = healed[p].done;
     if (mesh.corners.empty() || !mesh.balanced()) continue;

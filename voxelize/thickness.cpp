@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 
+#include "base/program/share_scope.h"
 #include "voxelize/heal/heal.h"
 #include "voxelize/heal/heal_cgal.h"
 
@@ -26,7 +27,9 @@ struct Least {
 std::vector<Least> least_ways(const PartMesh& mesh) {
   std::vector<Least> least(mesh.world.size());
   const RayCaster rays(mesh);
+  constexpr std::uint32_t kTrianglesAtATime = 1024;
   for (std::uint32_t t = 0; t < mesh.corners.size(); ++t) {
+    if (t % kTrianglesAtATime == 0) tell_share(t / static_cast<double>(mesh.corners.size()));
     const Corners& c = mesh.corners[t];
     const Vec3 normal = unit_normal(mesh, t),
                middle = (mesh.world[c[0]] + mesh.world[c[1]] + mesh.world[c[2]]) / 3;
@@ -46,14 +49,18 @@ std::vector<Least> least_ways(const PartMesh& mesh) {
 
 std::vector<double> vertex_thickness(const Surface& surface) {
   std::map<std::array<double, 3>, double> at;  // by position: healing welds, the surface does not
-  for (PartMesh& mesh : exact_part_meshes(surface)) {
+  std::vector<PartMesh> meshes = exact_part_meshes(surface);
+  const auto parts = static_cast<double>(meshes.size());
+  for (std::size_t p = 0; p < meshes.size(); ++p) {
+    PartMesh& mesh = meshes[p];
     if (mesh.corners.empty()) continue;
+    const ShareScope scope(static_cast<double>(p) / parts, static_cast<double>(p + 1) / parts);
     const HealedPart part = heal(std::move(mesh), {}, "");
     const std::vector<Least> least = least_ways(part.mesh);
     for (std::size_t v = 0; v < least.size(); ++v) {
-      const Vec3& p = part.mesh.world[v];
+      const Vec3& x = part.mesh.world[v];
       const double way = least[v].opposed < kNone ? least[v].opposed : least[v].any;
-      double& known = at.try_emplace({p.x(), p.y(), p.z()}, kNone).first->second;
+      double& known = at.try_emplace({x.x(), x.y(), x.z()}, kNone).first->second;
       known = std::min(known, way);
     }
   }

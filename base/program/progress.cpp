@@ -24,6 +24,7 @@ namespace {
 
 ProgressListener* listener = nullptr;
 SilentUpdate silent_update = nullptr;
+bool bar_shown = false;  // by any Progress, on the last line of the terminal
 bool brief_output = false, holds_warnings = false, keeps_warnings = false;
 std::vector<std::string> held_warnings, kept_warnings;
 std::string held_program;  // that gave the last of them
@@ -37,6 +38,10 @@ double now() {
 
 void print_error(const std::string& text) {
   std::fwrite(text.data(), 1, text.size(), stderr);
+}
+
+void erase_bar() {
+  if (std::exchange(bar_shown, false)) print_error("\r\033[K");
 }
 
 Progress::Mode resolve(Progress::Mode mode) {
@@ -81,9 +86,11 @@ HeldWarnings::HeldWarnings() : exceptions_(std::uncaught_exceptions()) {
 
 HeldWarnings::~HeldWarnings() {
   holds_warnings = false;
-  if (std::uncaught_exceptions() > exceptions_)
+  if (std::uncaught_exceptions() > exceptions_) {
+    if (!held_warnings.empty()) erase_bar();
     for (const std::string& line : held_warnings)
       print_error(fmt::format("{}: warning: {}\n", held_program, printable(line)));
+  }
   held_warnings.clear();
 }
 
@@ -123,11 +130,11 @@ void Progress::stage(const std::string& name) {
 }
 
 void Progress::update(double share, const std::string& note) {
-  if (mode_ == Mode::silent) {
+  if (mode_ == Mode::silent || mode_ == Mode::quiet) {
     if (silent_update != nullptr) silent_update(*this, share, note);
     return;
   }
-  const bool listening = listener != nullptr && mode_ != Mode::quiet;
+  const bool listening = listener != nullptr;
   if ((mode_ != Mode::bar && !listening) || stage_.empty()) return;
   const double time = now();
   if (last_drawn_ >= 0 && time - last_drawn_ < kDrawInterval) return;
@@ -143,7 +150,7 @@ void Progress::update(double share, const std::string& note) {
   const std::size_t columns = terminal_columns();
   if (line.size() >= columns) line.resize(columns - 1);  // a wrapped line could not be rewritten
   print_error("\r" + line + "\033[K");
-  bar_drawn_ = true;
+  bar_drawn_ = bar_shown = true;
 }
 
 void Progress::say(const std::string& line) {
@@ -165,7 +172,7 @@ void Progress::warn(const std::string& line) {
   }
   if (keeps_warnings) add_to(kept_warnings);
   if (listener != nullptr) return listener->warn(line);
-  clear_bar();
+  erase_bar();  // of whichever Progress: this may be a run within a run
   print_error(fmt::format("{}: warning: {}\n", program_, printable(line)));
 }
 
@@ -179,7 +186,7 @@ void Progress::finish() {
 }
 
 void Progress::clear_bar() {
-  if (bar_drawn_) print_error("\r\033[K");
+  if (bar_drawn_) erase_bar();
   bar_drawn_ = false;
 }
 

@@ -1,4 +1,4 @@
-// Who hears the updates of silent Progresses: runs within runs (base/program/progress_stretch.h).
+// Who hears the updates of silent and quiet Progresses: runs within runs (base/program/progress_stretch.h).
 #pragma once
 #include <string>
 

@@ -80,7 +80,7 @@ void shade(benchmark::State& state) {
   const ThreadLimit threads(static_cast<int>(state.range(0)));
   const picture::Tracer tracer = make_tracer(drawn());
   picture::Image image(1600, 1200, colour(0xffffff));
-  for (auto _ : state) render(image, {0, 0, 1600, 1200}, camera(), drawn(), tracer, {}, [](double) {});
+  for (auto _ : state) render(image, {0, 0, 1600, 1200}, camera(), drawn(), tracer, {});
 }
 
 void lines(benchmark::State& state) {

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/program/share_scope.h"
 #include "flexel/picture/lattice_drawable.h"
 #include "flexel/picture/render/quantity.h"
 #include "flexel/picture/render/thickness.h"
@@ -138,9 +139,19 @@ void draw_body_surface(const Body& body, const PictureOptions& options, const Co
                        Progress& progress, Panel& panel) {
   mapping::MapOptions how;
   how.method = mapping::default_method(body);
-  const mapping::MapResult mapped = map_surface(body, how, progress);
-  if (const std::optional<Body> split = split_where_coarse(body, mapped, progress))
+  constexpr double kFirst = 0.4, kLooked = 0.6;  // of the time
+  const mapping::MapResult mapped = [&] {
+    const ShareScope first(progress, 0, kFirst);
+    return map_surface(body, how, progress);
+  }();
+  const std::optional<Body> split = [&] {
+    const ShareScope looking(progress, kFirst, kLooked);
+    return split_where_coarse(body, mapped, progress);
+  }();
+  if (split) {
+    const ShareScope second(progress, kLooked, 1);
     return draw_mapped(*split, map_surface(*split, how, progress), options, by, panel);
+  }
   draw_mapped(body, mapped, options, by, panel);
 }
 
@@ -217,17 +228,26 @@ Panel make_panel(const PictureSubject& subject, const PictureOptions& options, c
                  Progress& progress) {
   Panel panel;
   panel.subject = &subject;
+  constexpr double kPlaced = 0.4, kTraced = 0.7, kTracedAtRest = 0.9;  // of the time
   if (!subject.body) {
     draw_surface_file(subject.surface, options, by, panel);
   } else if (options.show == PictureOptions::Show::surface) {
     if (subject.body->surface.polygon_count() == 0)
       throw InputError(subject.where, "carries no surface: --cells or --elements draws its lattice");
+    const ShareScope mapping(progress, 0, kPlaced);
     draw_body_surface(*subject.body, options, by, progress, panel);
   } else {
     draw_lattice(*subject.body, options, by, panel);
   }
-  panel.tracer = std::make_unique<Tracer>(make_tracer(panel.drawn));
-  if (panel.rest) panel.rest_tracer = std::make_unique<Tracer>(make_tracer(*panel.rest));
+  {
+    const ShareScope tracing(progress, kPlaced, kTraced);
+    panel.tracer = std::make_unique<Tracer>(make_tracer(panel.drawn));
+  }
+  if (panel.rest) {
+    const ShareScope tracing(progress, kTraced, kTracedAtRest);
+    panel.rest_tracer = std::make_unique<Tracer>(make_tracer(*panel.rest));
+  }
+  const ShareScope ranging(progress, kTracedAtRest, 1);
   find_range(by, panel);
   return panel;
 }

@@ -21,7 +21,7 @@
 namespace flexel::picture {
 namespace {
 
-constexpr double kPanels = 0.25;  // of the time, until it is known what is drawn
+constexpr double kPanels = 0.25, kViewed = 0.3;  // of the time, until it is known what is drawn, from where
 constexpr std::uint32_t kPaper = 0xfafbfc, kRestInk = 0x7a8794;
 
 double range_end(const std::string& text, std::optional<Dimension> dimension) {
@@ -87,17 +87,22 @@ View choose_view(const std::vector<Panel>& panels, const PictureOptions& options
 }
 
 void draw_panel(Image& image, const Panel& panel, const Viewport& viewport, const Camera& camera,
-                const ShadeOptions& shade, float scale, const std::function<void(double)>& progress) {
+                const ShadeOptions& shade, float scale) {
   // The viewport holds the part exactly; outlines and soft edges need a little more.
   const int spare = 4;
   Viewport room{std::max(0, viewport.x - spare), std::max(0, viewport.y - spare), 0, 0};
   room.width = std::min(image.width, viewport.x + viewport.width + spare) - room.x;
   room.height = std::min(image.height, viewport.y + viewport.height + spare) - room.y;
-  render(image, room, camera, panel.drawn, *panel.tracer, shade, progress);
+  constexpr double kRendered = 0.8, kLinesAtRest = 0.9;  // of the time
+  {
+    const ShareScope rendering(0, kRendered);
+    render(image, room, camera, panel.drawn, *panel.tracer, shade);
+  }
   check_stop();
   LineStyle style;
   style.scale = scale;
   if (panel.rest) {
+    const ShareScope drawing(kRendered, kLinesAtRest);
     const Moved moved{panel.drawn, *panel.tracer};
     LineStyle rest = style;
     rest.ink = colour(kRestInk);
@@ -106,8 +111,9 @@ void draw_panel(Image& image, const Panel& panel, const Viewport& viewport, cons
     rest.scale = 0.8f * scale;
     draw_lines(image, visible_lines(*panel.rest, *panel.rest_tracer, camera, &moved), rest);
   }
-  if (!panel.drawn.triangles.empty())
-    draw_lines(image, visible_lines(panel.drawn, *panel.tracer, camera), style);
+  if (panel.drawn.triangles.empty()) return;
+  const ShareScope drawing(kLinesAtRest, 1);
+  draw_lines(image, visible_lines(panel.drawn, *panel.tracer, camera), style);
 }
 
 void hint_at_scale(const std::vector<Panel>& panels, double exaggeration, std::vector<std::string>& notes) {
@@ -248,9 +254,9 @@ PictureResult draw_picture(const std::vector<PictureSubject>& subjects, const Pi
   std::optional<Legend> legend;
   if (!by.name.empty()) legend = make_legend(panels, by, options, result.notes);
   hint_at_scale(panels, *options.exaggeration, result.notes);
-  progress.update(kPanels, "choosing the view");
   const Layout layout = lay_out(panels.size(), options, legend ? &*legend : nullptr);
   if (views.empty()) {
+    const ShareScope choosing(progress, kPanels, kViewed, "choosing the view");
     views = {choose_view(panels, options, result.notes)};
   } else {
     const std::vector<View> sides = views;
@@ -267,11 +273,11 @@ PictureResult draw_picture(const std::vector<PictureSubject>& subjects, const Pi
       shade.low = static_cast<float>(legend->low);
       shade.high = static_cast<float>(legend->high);
     }
-    const auto drawn = [&](double share) {
-      progress.update(0.3 + 0.7 * (static_cast<double>(p) + share) / static_cast<double>(panels.size()),
-                      "casting rays");
+    const auto share = [&](std::size_t drawn) {
+      return kViewed + (1 - kViewed) * static_cast<double>(drawn) / static_cast<double>(panels.size());
     };
-    draw_panel(result.image, panels[p], layout.panels[p], framing.cameras[p], shade, layout.text / 21, drawn);
+    const ShareScope drawing(progress, share(p), share(p + 1), "casting rays");
+    draw_panel(result.image, panels[p], layout.panels[p], framing.cameras[p], shade, layout.text / 21);
   }
   if (options.faces) number_faces(result.image, panels, layout, framing, result.notes);
   annotate(result.image, panels, layout, framing, legend ? &*legend : nullptr, *options.exaggeration);

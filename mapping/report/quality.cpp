@@ -9,6 +9,7 @@
 
 #include "base/math/eigenvalues.h"
 #include "base/parallel.h"
+#include "base/program/share_scope.h"
 #include "formats/part/topology.h"
 
 namespace flexel::mapping {
@@ -68,8 +69,11 @@ SurfaceQuality surface_quality(const Surface& surface, const MapResult& result,
   std::vector<Vec3> moved(rest.size());
   parallel_for_each(moved.size(), [&](std::size_t v) { moved[v] = rest[v] + result.displacement[v]; });
   const Topology mesh = topology(corners, weld(rest));
+  constexpr std::size_t kTrianglesAtATime = 1024;
+  ShareCounter done(corners.size());
   const Sums sums = parallel_sum<Sums>(corners.size(), [&](std::size_t t) {
     Sums own;
+    if (t % kTrianglesAtATime == 0) done.add(std::min(kTrianglesAtATime, corners.size() - t));
     const Vec3 before = area_of(rest, corners[t]), after = area_of(moved, corners[t]);
     if (!(before.norm() > 0) || !after.allFinite()) return own;
     own.triangles = 1;

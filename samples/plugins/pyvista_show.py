@@ -1,4 +1,4 @@
-"""Bends a part and shows it by PyVista, which is not in Debian 12: pip install pyvista.
+"""Bends a part and shows it by PyVista, which is not in Debian 12: pip install pyvista (Debian 13: python3-pyvista).
 
     python3 pyvista_show.py PART PICTURE.png      held at xmin, pushed down by 100 N at xmax
 """

@@ -22,6 +22,7 @@
 #include "base/human.h"
 #include "base/math/eigenvalues.h"
 #include "base/program/progress_stretch.h"
+#include "base/program/share_scope.h"
 #include "base/stop.h"
 #include "base/units.h"
 #include "simulate/equilibrium/rigid_link_equilibrium.h"
@@ -47,8 +48,7 @@ constexpr double kPushedIncrement = 0.25;   // of the first load step: how far b
 constexpr int kPushedIterations = 300;
 constexpr int kMostPushes = 4;         // of a run
 constexpr double kUnsupported = 1e-9;  // of the stiffness of an element in its stiffest direction
-// Shares of the run's time: until the first linear solution begins; until a start from a coarser lattice is found.
-constexpr double kPrepared = 0.25, kStarted = 0.4;
+constexpr double kStarted = 0.4;   // share of the run's time until a start from a coarser lattice is found
 constexpr double kFarReach = 0.1;  // diagonals: a first linear answer beyond this makes a start elsewhere pay
 constexpr double kOverload = 3;    // diagonals: a first linear answer beyond this suggests a wrong unit
 // ... and one beyond this many diagonals, or times the way that moves lead, is one. A strip rolled up by two
@@ -119,7 +119,7 @@ class LoadStepping {
   const CoarseStart& start_;
   double first_, longest_;  // share of the load: the first step; none is longer
   double increment_, done_ = 0;
-  double begun_ = kPrepared;  // share of the run's time that its start takes
+  double begun_ = kBeforeFirstStep;  // share of the run's time that its start takes
   EquilibriumResult result_;
   State trial_;  // of the last attempt
   NewtonOutcome outcome_;
@@ -178,9 +178,12 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   if (near_) trial_.displacement = near_->displacement;
   trial_.share = done_ + increment_ > 1 - 1e-9 ? 1 : done_ + increment_;
   if (pushed_) push(trial_);
+  std::optional<ShareScope> preparing;
+  if (reach_ == 0) preparing.emplace(progress_, kBeforeSearch, kBeforeFirstStep, "preparing");
   double most_gone = 0;  // a residual may rise again
   outcome_ = newton_with_links(mechanics_, trial_, options, [&](double gone, const std::string& note) {
     check_stop();
+    preparing.reset();
     most_gone = std::max(most_gone, gone);
     progress_.update(begun_ + (1 - begun_) * (done_ + most_gone * (trial_.share - done_)),
                      fmt::format("load {:.3g} %, {}", 100 * trial_.share, note));
@@ -280,7 +283,7 @@ bool LoadStepping::begin_near() {
   farthest_reach_ = std::numeric_limits<double>::infinity();
   if (!far) return false;
   if (!overloaded()) {
-    ProgressStretch stretch(progress_, kPrepared, kStarted);
+    ProgressStretch stretch(progress_, kBeforeFirstStep, kStarted);
     near_ = start_(stretch.inner());
     begun_ = kStarted;
   }

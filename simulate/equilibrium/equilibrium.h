@@ -9,6 +9,9 @@
 
 namespace flexel::simulate {
 
+// Shares of a run's time: before the equilibrium is looked for; until the first linear solution begins.
+inline constexpr double kBeforeSearch = 0.065, kBeforeFirstStep = 0.25;
+
 struct EquilibriumResult {
   int load_steps = 0, newton_iterations = 0, cg_iterations = 0;
   double relative_residual = 0;

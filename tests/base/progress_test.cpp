@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -36,6 +38,62 @@ TEST(Progress, ARunWithinARunMovesItsStretchOfTheStage) {
   EXPECT_TRUE(heard.lines.empty());
   whole.say("told");
   EXPECT_EQ(heard.lines, std::vector<std::string>{"told"});
+}
+
+TEST(Progress, ARunWithinARunMayWarn) {
+  Heard heard;
+  Progress whole("flexel", Progress::Mode::lines);
+  whole.stage("bars");
+  wait_for_update();
+  ProgressStretch stretch(whole, 0.5, 1, "flexel");
+  stretch.inner().update(0.5);
+  stretch.inner().say("not told");
+  stretch.inner().warn("told");
+  EXPECT_EQ(heard.shares, (std::vector<double>{0, 0.75}));
+  EXPECT_EQ(heard.lines, std::vector<std::string>{"told"});
+}
+
+TEST(Progress, ARunWithinARunOfSeveralStagesNeverGoesBack) {
+  for (const bool warns : {false, true}) {
+    Heard heard;
+    Progress whole("flexel", Progress::Mode::lines);
+    whole.stage("bars");
+    const auto stretch = warns ? std::make_unique<ProgressStretch>(whole, 0.5, 1, "flexel")
+                               : std::make_unique<ProgressStretch>(whole, 0.5, 1);
+    for (const char* stage : {"heal", "voxelize"}) {
+      wait_for_update();
+      stretch->inner().stage(stage);
+      for (const double share : {0.25, 0.75, 2.0}) {
+        wait_for_update();
+        stretch->inner().update(share);
+      }
+    }
+    ASSERT_GT(heard.shares.size(), 4u);
+    EXPECT_TRUE(std::is_sorted(heard.shares.begin(), heard.shares.end()));
+    EXPECT_EQ(heard.shares[warns ? 2 : 1], 0.625);
+    EXPECT_EQ(heard.shares.back(), 1);
+  }
+}
+
+TEST(Progress, AWarningOfARunWithinARunErasesTheBar) {
+  testing::internal::CaptureStderr();
+  {
+    Progress whole("flexel", Progress::Mode::bar);
+    whole.stage("bars");
+    ProgressStretch stretch(whole, 0.5, 1, "flexel");
+    stretch.inner().warn("told");
+  }
+  EXPECT_NE(testing::internal::GetCapturedStderr().find("\r\033[Kflexel: warning: told\n"),
+            std::string::npos);
+}
+
+TEST(Progress, OfAQuietRunNoUpdateIsHeard) {
+  Heard heard;
+  Progress quiet("flexel", Progress::Mode::quiet);
+  quiet.stage("bars");
+  ProgressStretch stretch(quiet, 0, 1);
+  stretch.inner().update(0.5);
+  EXPECT_TRUE(heard.stages.empty());
 }
 
 TEST(Progress, OfASilentRunNothingIsHeard) {

@@ -264,5 +264,21 @@ def test_pyvista():
     expect(pathlib.Path("bent.png").read_bytes()[:4] == b"\x89PNG", "no picture")
 
 
+def test_pyvista_of_the_page():
+    """The page's lines, each into a picture."""
+    python_module("numpy", "meshio", "pyvista")
+    page = (SOURCE / "docs/guide/other-tools.md").read_text(encoding="utf-8")
+    lines = re.search(r"^## PyVista$.*?^```text\n(.*?)^```$", page, re.M | re.S)[1].splitlines()
+    expect(lines and all(line.count(".plot(") == 1 for line in lines), lines)
+    box()
+    code = ["import flexel, pyvista", "pyvista.OFF_SCREEN = True",
+            'result = flexel.deform("box.stl", fix="xmin", push={"xmax": (0, 0, -100)}, material="PLA", size="2.5 mm", output="body.vtu")']
+    code += [line.replace(".plot(", f".plot(screenshot='{number}.png', ") for number, line in enumerate(lines)]
+    with screen() as shown:
+        expect_ok(run(sys.executable, "-c", "\n".join(code), timeout=PATIENCE, env=on_path(**shown)))
+    for number, line in enumerate(lines):
+        expect(pathlib.Path(f"{number}.png").read_bytes()[:4] == b"\x89PNG", line)
+
+
 if __name__ == "__main__":
     main(globals())

@@ -6,8 +6,11 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 
+#include "../mapping/bodies.h"
 #include "base/error.h"
+#include "base/program/silent_updates.h"
 #include "flexel/picture/canvas/colour_map.h"
 #include "flexel/picture/canvas/text.h"
 #include "flexel/picture/render/camera.h"
@@ -35,6 +38,33 @@ PictureOptions small(const View& view = {}) {
   options.height = 300;
   options.view = view;
   return options;
+}
+
+std::vector<double> shares_told;
+
+// Its triangles are split before it is drawn.
+TEST(PictureProgress, OfABentBodyWithLongTrianglesNeverGoesBack) {
+  Body bar = mapping::test::block(40, 4, 4, 0.001, Placement::corner, 1);
+  bar.surface_cell_offsets.clear();
+  bar.surface_cells.clear();
+  mapping::test::deform(bar, [](const Vec3& x) {
+    constexpr double kRadius = 0.04;
+    return Vec3((kRadius - x.z()) * std::sin(x.x() / kRadius), x.y(),
+                kRadius - (kRadius - x.z()) * std::cos(x.x() / kRadius));
+  });
+  PictureSubject bent;
+  bent.label = bent.where = "bent";
+  bent.body = bar;
+  PictureOptions options = small();
+  options.view.reset();  // it is chosen
+  shares_told.clear();
+  set_silent_update([](const Progress&, double share, const std::string&) { shares_told.push_back(share); });
+  Progress quiet("test", Progress::Mode::quiet);
+  (void)draw_picture({bent}, options, quiet);
+  set_silent_update(nullptr);
+  EXPECT_GT(shares_told.size(), 100u);
+  EXPECT_TRUE(std::is_sorted(shares_told.begin(), shares_told.end()));
+  EXPECT_NEAR(shares_told.back(), 1, 1e-12);
 }
 
 TEST(Views, NamedOnesLookAlongTheAxes) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "base/parallel.h"
+#include "base/program/share_scope.h"
 #include "flexel/picture/canvas/colour_map.h"
 #include "scenes.h"
 
@@ -35,7 +36,7 @@ Shot shoot(const Surface& surface, const View& view, int size = 400, const std::
   camera.pixels = 0.45f * static_cast<float>(size);
   camera.x = camera.y = static_cast<float>(size) / 2;
   Image image(size, size, colour(kWhite));
-  render(image, {0, 0, size, size}, camera, drawn, make_tracer(drawn), options, [](double) {});
+  render(image, {0, 0, size, size}, camera, drawn, make_tracer(drawn), options);
   return {camera, image, camera.pixels / frame.radius};
 }
 
@@ -62,6 +63,23 @@ TEST(Render, SphereCoversItsDisc) {
     EXPECT_NEAR(x / area, 200, 0.2);
     EXPECT_NEAR(y / area, 200, 0.2);
   }
+}
+
+TEST(Render, TellsItsShareToTheEnd) {
+  const ThreadLimit alone(1);
+  const Surface ball = test::sphere({0, 0, 0}, 1);
+  const Drawable drawn = draw_surface(ball, mesh_topology(ball), ball.vertices, {Vec3::Zero(), 1});
+  const Tracer tracer = make_tracer(drawn);
+  Camera camera = camera_towards(View{});
+  camera.pixels = 60;
+  camera.x = camera.y = 64;
+  Image image(128, 128, colour(kWhite));
+  std::vector<double> shares;
+  const ShareScope scope([&](double share) { shares.push_back(share); });
+  render(image, {0, 0, 128, 128}, camera, drawn, tracer, {});
+  EXPECT_GT(shares.size(), 100u);
+  EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
+  EXPECT_DOUBLE_EQ(shares.back(), 1);
 }
 
 TEST(Render, TheNearerPartHidesTheFarther) {

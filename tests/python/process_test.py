@@ -242,7 +242,7 @@ def test_progress_of_cad_files():
 
 
 def test_progress_of_each_stage():
-    """Deep within a stage it is told how far it is: of a wrap, of a lattice, of a map and its checks, of a CAD file's triangles."""
+    """Deep within a stage it is told how far it is: of a wrap, of a lattice, of a map and its checks, of a picture, of a CAD file's triangles."""
     flexel = module()
     need_step()
     bracket()
@@ -257,7 +257,8 @@ def test_progress_of_each_stage():
     flexel.voxelize(part, size=0.00025, progress=hear("lattice"))
     bent = flexel.simulate(flexel.voxelize(part, size=0.0025), estimate=False, **PULL).body
     flexel.map(bent, check="self-intersection", progress=hear("map"))
-    for key in (("cad", "import"), ("wrap", "heal"), ("lattice", "voxelize"), ("map", "map")):
+    flexel.picture(bent, progress=hear("picture"))
+    for key in (("cad", "import"), ("wrap", "heal"), ("lattice", "voxelize"), ("map", "map"), ("picture", "picture")):
         check.assertTrue(any(0 < share < 1 for share in seen[key]), f"{key}: {seen[key]}")
         check.assertEqual(seen[key], sorted(seen[key]), f"{key}")
 

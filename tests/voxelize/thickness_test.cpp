@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/program/share_scope.h"
 #include "tests/voxelize/shapes.h"
 
 namespace flexel::voxelize {
@@ -29,6 +30,15 @@ TEST(Thickness, OfAForkIsThatOfItsLeaves) {
       EXPECT_NEAR(thickness[v], .1, 1e-9);
     }
   }
+}
+
+TEST(Thickness, OfManyTrianglesTellsItsShare) {
+  std::vector<double> shares;
+  const ShareScope scope([&](double share) { shares.push_back(share); });
+  (void)vertex_thickness(surface(icosphere(4, 1)));
+  EXPECT_GE(shares.size(), 5u);
+  EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
+  EXPECT_GT(shares.back(), 0.5);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/parallel.h"
+#include "base/program/share_scope.h"
 
 namespace flexel::picture {
 namespace {
@@ -124,11 +125,13 @@ View best_view(const std::vector<ViewSubject>& subjects, double aspect, Up up) {
   std::vector<double> scores(all.size(), 0);
   std::vector<std::vector<Probe>> points;
   for (const ViewSubject& subject : subjects) points.push_back(probes(*subject.drawn));
+  ShareCounter done(all.size());
   parallel_for_each(
       all.size(),
       [&](std::size_t i) {
         for (std::size_t k = 0; k < subjects.size(); ++k)
           scores[i] += all[i].preference * score(subjects[k], points[k], all[i].view, aspect);
+        done.add(1);
       },
       1);
   return all[static_cast<std::size_t>(std::max_element(scores.begin(), scores.end()) - scores.begin())].view;

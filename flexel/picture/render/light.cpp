@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "base/parallel.h"
+#include "base/program/share_scope.h"
 
 namespace flexel::picture {
 namespace {
@@ -160,8 +161,10 @@ std::vector<Light> trace_light(const PixelBuffer& buffer, const Viewport& viewpo
   const int across = (buffer.width + kLightTile - 1) / kLightTile,
             down = (buffer.height + kLightTile - 1) / kLightTile;
   const Vec3f lamp = lamp_direction(camera);
+  const std::size_t tiles = static_cast<std::size_t>(across) * static_cast<std::size_t>(down);
+  ShareCounter done(tiles);
   parallel_for_each(
-      static_cast<std::size_t>(across) * static_cast<std::size_t>(down),
+      tiles,
       [&](std::size_t tile) {
         const int left = static_cast<int>(tile) % across * kLightTile,
                   top = static_cast<int>(tile) / across * kLightTile;
@@ -171,6 +174,7 @@ std::vector<Light> trace_light(const PixelBuffer& buffer, const Viewport& viewpo
               gather(buffer, viewport, camera, drawn, left + place % kBlock, top + place / kBlock);
           if (!group.pixels.empty()) light_group(group, place * 7 % 16, tracer, lamp, light);
         }
+        done.add(1);
       },
       4);
   return light;

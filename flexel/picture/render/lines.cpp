@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "base/parallel.h"
+#include "base/program/share_scope.h"
 
 namespace flexel::picture {
 namespace {
@@ -159,12 +160,14 @@ std::vector<ScreenLine> visible_lines(const Drawable& drawn, const Tracer& trace
   const std::vector<Edge> edges = candidates(drawn, camera);
   constexpr std::size_t kGrain = 256;
   std::vector<std::vector<ScreenLine>> found(edges.size() / kGrain + 1);
+  ShareCounter done(edges.size());
   parallel_chunks(edges.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     Pieces pieces;
     for (std::size_t e = begin; e < end; ++e) {
       judge(edges[e], tracer, moved, camera, pieces);
       add_runs(edges[e], camera, pieces, found[begin / kGrain]);
     }
+    done.add(end - begin);
   });
   std::vector<ScreenLine> lines;
   for (const auto& part : found) lines.insert(lines.end(), part.begin(), part.end());

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/parallel.h"
+#include "base/program/share_scope.h"
 #include "flexel/picture/canvas/colour_map.h"
 #include "flexel/picture/render/light.h"
 #include "flexel/picture/render/surfel.h"
@@ -58,11 +59,14 @@ PixelBuffer trace_pixels(const Scene& scene) {
   buffer.hits.resize(buffer.index(0, buffer.height));
   buffer.normals.resize(buffer.hits.size());
   const int across = (buffer.width + kTile - 1) / kTile, down = (buffer.height + kTile - 1) / kTile;
+  const std::size_t tiles = static_cast<std::size_t>(across) * static_cast<std::size_t>(down);
+  ShareCounter done(tiles);
   parallel_for_each(
-      static_cast<std::size_t>(across) * static_cast<std::size_t>(down),
+      tiles,
       [&](std::size_t tile) {
         trace_tile(scene, static_cast<int>(tile) % across * kTile, static_cast<int>(tile) / across * kTile,
                    buffer);
+        done.add(1);
       },
       4);
   return buffer;
@@ -200,31 +204,34 @@ Tracer make_tracer(const Drawable& drawn) {
 }
 
 void render(Image& image, const Viewport& viewport, const Camera& camera, const Drawable& drawn,
-            const Tracer& tracer, const ShadeOptions& options, const std::function<void(double)>& progress) {
-  constexpr double kLit = 0.3, kShaded = 0.35;  // shares of the time; edges take the rest
-  constexpr std::size_t kBands = 10;
+            const Tracer& tracer, const ShadeOptions& options) {
+  constexpr double kTraced = 0.05, kLit = 0.3, kShaded = 0.35;  // shares of the time; edges take the rest
   const Scene scene{viewport, camera, drawn, tracer, options};
-  const PixelBuffer buffer = trace_pixels(scene);
-  const std::vector<Light> light =
-      smooth_light(trace_light(buffer, viewport, camera, drawn, tracer), buffer, camera);
-  progress(kLit);
+  const PixelBuffer buffer = [&] {
+    const ShareScope tracing(0, kTraced);
+    return trace_pixels(scene);
+  }();
+  const std::vector<Light> traced = [&] {
+    const ShareScope lighting(kTraced, kLit);
+    return trace_light(buffer, viewport, camera, drawn, tracer);
+  }();
+  const std::vector<Light> light = smooth_light(traced, buffer, camera);
   const std::vector<Colour> colours = shade_pixels(scene, image, buffer, light);
+  const ShareScope refining(kShaded, 1);
   const auto rows = static_cast<std::size_t>(buffer.height);
-  for (std::size_t band = 0; band < kBands; ++band) {
-    progress(kShaded + (1 - kShaded) * static_cast<double>(band) / kBands);
-    const std::size_t begin = rows * band / kBands, end = rows * (band + 1) / kBands;
-    parallel_for_each(
-        end - begin,
-        [&](std::size_t row) {
-          const int y = static_cast<int>(begin + row);
-          for (int x = 0; x < buffer.width; ++x) {
-            Colour& pixel = image.pixels[image.index(viewport.x + x, viewport.y + y)];
-            pixel = stands_out(buffer, colours, x, y) ? fine_colour(scene, buffer, light, pixel, x, y)
-                                                      : colours[buffer.index(x, y)];
-          }
-        },
-        4);
-  }
+  ShareCounter done(rows);
+  parallel_for_each(
+      rows,
+      [&](std::size_t row) {
+        const int y = static_cast<int>(row);
+        for (int x = 0; x < buffer.width; ++x) {
+          Colour& pixel = image.pixels[image.index(viewport.x + x, viewport.y + y)];
+          pixel = stands_out(buffer, colours, x, y) ? fine_colour(scene, buffer, light, pixel, x, y)
+                                                    : colours[buffer.index(x, y)];
+        }
+        done.add(1);
+      },
+      4);
 }
 
 }  // namespace flexel::picture

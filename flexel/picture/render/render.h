@@ -1,7 +1,5 @@
 // The shaded picture of a drawable, without lines and text.
 #pragma once
-#include <functional>
-
 #include "flexel/picture/canvas/image.h"
 #include "flexel/picture/render/camera.h"
 #include "flexel/picture/render/drawable.h"
@@ -19,9 +17,9 @@ struct ShadeOptions {
 [[nodiscard]] Colour part_tint(std::uint32_t part);
 
 // Shades what the camera sees of `drawn` onto `image` within the viewport, antialiased. The same pixels for
-// any number of threads. `progress` is told the share that is done, between the threads' work.
+// any number of threads. Tells its share.
 void render(Image& image, const Viewport& viewport, const Camera& camera, const Drawable& drawn,
-            const Tracer& tracer, const ShadeOptions& options, const std::function<void(double)>& progress);
+            const Tracer& tracer, const ShadeOptions& options);
 
 // The tracer of a drawable.
 [[nodiscard]] Tracer make_tracer(const Drawable& drawn);

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/parallel.h"
+#include "base/program/share_scope.h"
 
 namespace flexel::picture {
 
@@ -23,14 +24,19 @@ ThicknessRange thickness_range(const Drawable& drawn, const Tracer& tracer) {
     float thickness, area;
   };
   std::vector<Found> found(drawn.triangles.size());
-  parallel_for_each(found.size(), [&](std::size_t t) {
-    const auto& c = drawn.triangles[t];
-    const Vec3f &p = drawn.vertices[c[0]], &q = drawn.vertices[c[1]], &r = drawn.vertices[c[2]];
-    const Vec3f cross = (q - p).cross(r - p);
-    const float area = cross.norm();
-    found[t] = {area > 0 ? thickness_at(tracer, (p + q + r) / 3, cross / area)
-                         : std::numeric_limits<float>::quiet_NaN(),
-                area};
+  constexpr std::size_t kTrianglesAtATime = 1024;
+  ShareCounter done(found.size());
+  parallel_chunks(found.size(), kTrianglesAtATime, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const auto& c = drawn.triangles[t];
+      const Vec3f &p = drawn.vertices[c[0]], &q = drawn.vertices[c[1]], &r = drawn.vertices[c[2]];
+      const Vec3f cross = (q - p).cross(r - p);
+      const float area = cross.norm();
+      found[t] = {area > 0 ? thickness_at(tracer, (p + q + r) / 3, cross / area)
+                           : std::numeric_limits<float>::quiet_NaN(),
+                  area};
+    }
+    done.add(end - begin);
   });
   std::erase_if(found, [](const Found& f) { return !std::isfinite(f.thickness); });
   if (found.empty()) return {};

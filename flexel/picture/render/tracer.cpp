@@ -8,6 +8,8 @@
 #include <new>
 #include <stdexcept>
 
+#include "base/program/share_scope.h"
+
 namespace flexel::picture {
 namespace {
 
@@ -69,6 +71,11 @@ struct Tracer::State {
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene, geometry);
     rtcReleaseGeometry(geometry);
+    const auto tell = [](void*, double share) {
+      tell_share(share);
+      return true;
+    };
+    rtcSetSceneProgressMonitorFunction(scene, tell, nullptr);
     rtcCommitScene(scene);
     if (rtcGetDeviceError(device) != RTC_ERROR_NONE) fail(device);
   }
