@@ -51,7 +51,7 @@ def test_a_renormalised_body_keeps_its_shape():
 def test_an_event_at_the_very_end_is_told():
     body()
     for at, told in (("2 ms", True), ("1.9 ms", False)):
-        scene(text=FREE + f'[[event]]\nat = "{at}"\ndo = "edit"\nwhere = "part"\nstiffness = 2.0\n')
+        scene(text=FREE + f'[[event]]\nat = "{at}"\ndo = "edit"\nstiffness = 2.0\n')
         result = expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu"))
         expect(("at the very end of the run" in result.err) == told, f"{at}: {result}")
 
