@@ -9,7 +9,7 @@
 #include "base/error.h"
 #include "base/files/files.h"
 #include "formats/common/file_formats.h"
-#include "formats/lattice/stress_columns.h"
+#include "formats/lattice/column_names.h"
 #include "mapping/report/attributes.h"
 
 namespace flexel::mapping {

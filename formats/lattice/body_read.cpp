@@ -14,7 +14,7 @@
 #include "formats/lattice/body_file_names.h"
 #include "formats/lattice/body_metadata.h"
 #include "formats/lattice/cell_moments.h"
-#include "formats/lattice/change_columns.h"
+#include "formats/lattice/column_names.h"
 #include "formats/vtu/vtu.h"
 
 namespace flexel {

@@ -6,7 +6,7 @@
 
 #include "base/files/output_file.h"
 #include "base/parallel.h"
-#include "formats/lattice/stress_columns.h"
+#include "formats/lattice/column_names.h"
 #include "formats/vtu/vtu.h"
 #include "mapping/anchors/frame.h"
 #include "mapping/report/quality.h"

@@ -13,7 +13,7 @@
 #include "base/math/eigenvalues.h"
 #include "base/parallel.h"
 #include "base/units.h"
-#include "formats/lattice/change_columns.h"
+#include "formats/lattice/column_names.h"
 
 namespace flexel::simulate {
 namespace {
