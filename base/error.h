@@ -38,7 +38,7 @@ class DivergedError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// --strict found an invalid mapping (exit 4).
+// --strict found an invalid mapping, or `flexel flex` missed its angle by half (exit 4).
 class InvalidMappingError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

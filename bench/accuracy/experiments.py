@@ -20,7 +20,7 @@ import sys
 import tempfile
 import tomllib
 
-from kept import Kept
+from kept import Kept, write_whole
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -437,9 +437,7 @@ def main():
     except (OSError, RuntimeError, subprocess.SubprocessError) as error:
         print(f"experiments.py: {error}", file=sys.stderr)
         return 1
-    part = options.output.with_name(options.output.name + ".part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(options.output)
+    write_whole(options.output, text)
     return 0
 
 

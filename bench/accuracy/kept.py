@@ -4,6 +4,13 @@ import json
 import re
 
 
+def write_whole(path, text):
+    """A run that is stopped meanwhile leaves what was there."""
+    part = path.with_name(path.name + ".part")
+    part.write_text(text, encoding="utf-8")
+    part.replace(path)
+
+
 class Kept:
     """What is done already, in a folder that a later run goes on from; without one nothing is kept."""
 
@@ -18,7 +25,5 @@ class Kept:
             return json.loads(path.read_text(encoding="utf-8"))
         result = make()
         if path:
-            part = path.with_name(path.name + ".part")
-            part.write_text(json.dumps(result), encoding="utf-8")
-            part.replace(path)
+            write_whole(path, json.dumps(result))
         return result

@@ -20,6 +20,7 @@ import sys
 import tempfile
 import time
 
+from kept import write_whole
 from step_parts import scene_of
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -266,9 +267,7 @@ def main():
         folder = pathlib.Path(place)
         text = ("# Model `quadratic`, measured\n\nWritten by `bench/accuracy/quadratic.py`, which says what is run and what the references are; the model is in\n"
                 "[quadratic.md](../theory/quadratic.md). Above 0 is too soft. One thread.\n\n" + beams(folder) + strips(folder) + cantilevers(folder) + bonded(folder) + step_parts(folder, options.parts))
-    part = options.output.with_name(options.output.name + ".part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(options.output)
+    write_whole(options.output, text)
     return 0
 
 

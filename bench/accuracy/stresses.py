@@ -23,6 +23,7 @@ import tempfile
 import time
 
 import meshio
+from kept import write_whole
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 YOUNG, POISSON = 210e9, 0.3
@@ -417,12 +418,6 @@ def one_table(results):
     return text + (f"\n{held} of {barred} bars hold; their median is {statistics.median(widths):.1f} %.\n" if widths else "")
 
 
-def write(path, text):
-    part = path.with_name(path.name + ".part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(path)
-
-
 def main():
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("-o", "--output", default=ROOT / "docs/measurements/stresses.md", type=pathlib.Path)
@@ -448,7 +443,7 @@ def main():
     closer = closer_section(measure_closer(options, in_a_folder))
     if options.closer:
         page = options.output.read_text(encoding="utf-8") if options.output.exists() else ""
-        write(options.output, page.split(CLOSER)[0].rstrip("\n") + "\n\n" + closer)
+        write_whole(options.output, page.split(CLOSER)[0].rstrip("\n") + "\n\n" + closer)
         return 0
     chosen = {name: case for name, case in {**cases(), **unseen_cases(), **random_cases(options.random)}.items()
               if not options.only or name in options.only}
@@ -458,7 +453,7 @@ def main():
                 for back in range(1, 8) for name, case in chosen.items() for size in case[4][-back:][:1] if back <= len(case[4])}
         true = {name: pool.submit(in_a_folder, reference, name, case[5]) for name, case in chosen.items()}
         results = {name: (true[name].result(), [row for size in case[4] for row in runs[name, size].result()]) for name, case in chosen.items()}
-    write(options.output, table(results) + "\n" + closer)
+    write_whole(options.output, table(results) + "\n" + closer)
     return 0
 
 

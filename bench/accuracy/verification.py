@@ -22,7 +22,7 @@ import subprocess
 import sys
 import tempfile
 
-from kept import Kept
+from kept import Kept, write_whole
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -240,9 +240,7 @@ def main():
     except (OSError, RuntimeError, subprocess.SubprocessError) as error:
         print(f"verification.py: {error}", file=sys.stderr)
         return 1
-    part = options.output.with_name(options.output.name + ".part")
-    part.write_text("\n".join(sections), encoding="utf-8")
-    part.replace(options.output)
+    write_whole(options.output, "\n".join(sections))
     print(f"verification.py: wrote {options.output}; {inside} of {count} bars hold", file=sys.stderr)
     return 0 if good and 10 * inside >= 9 * count else 1
 
