@@ -730,7 +730,8 @@ std::string summary_text(const SolvedRun& run, const mapping::MapReport& mapped,
                          const KeptWarnings& warnings) {
   nlohmann::ordered_json summary;
   summary["voxelize"] = parse_json(voxelize::summary_json(run.voxels));
-  summary["simulate"] = parse_json(simulate::summary_json(run.simulated, run.voxels.body));
+  summary["simulate"] = parse_json(simulate::summary_json(run.simulated, run.voxels.body,
+                                                          known_materials(plan.job.scene, run.voxels.body)));
   summary["map"] = parse_json(mapping::report_json(mapped, plan.map));
   if (accuracy) summary["accuracy"] = parse_json(accuracy->json());
   if (flexed) {

@@ -162,8 +162,9 @@ py::tuple simulate_body(const BodyObject& body, const std::vector<std::string>& 
     Progress progress("flexel");
     const KeptWarnings warnings;
     const simulate::SimulateResult result = simulate::simulate(moved, scene, options, progress);
-    run->summary = summary_json(result, moved, warnings.lines());
-    run->answer = answer_lines(result, moved, known_materials(scene, moved));
+    const std::vector<simulate::Material> materials = known_materials(scene, moved);
+    run->summary = summary_json(result, moved, materials, warnings.lines());
+    run->answer = answer_lines(result, moved, materials);
     progress.finish();
     run->body = body_object(std::move(moved));
   });

@@ -222,7 +222,8 @@ int run(int argc, char** argv) {
   if (series) options.series = arguments.output;
   OutputsTogether outputs({series ? "" : arguments.output, options.history, arguments.summary});
   const SimulateResult result = simulate::simulate(body, scene, options, progress);
-  const auto summary = [&] { return summary_json(result, body, warnings.lines()); };
+  const std::vector<Material> materials = known_materials(scene, body);
+  const auto summary = [&] { return summary_json(result, body, materials, warnings.lines()); };
   if (arguments.verbose || options.explain)
     for (const std::string& line : summary_lines(result)) progress.say(line);
   progress.stage("write");
@@ -232,7 +233,7 @@ int run(int argc, char** argv) {
   if (!arguments.summary.empty()) write_text(summary(), arguments.summary);
   outputs.appear();
   progress.finish();
-  for (const std::string& line : answer_lines(result, body, known_materials(scene, body))) progress.say(line);
+  for (const std::string& line : answer_lines(result, body, materials)) progress.say(line);
   if (arguments.json) write_text(summary(), "-");
   return kExitDone;
 }

@@ -12,6 +12,7 @@
 #include "simulate/probes/report.h"
 #include "simulate/quadratic/local_stress.h"
 #include "simulate/result/result.h"
+#include "simulate/scene/strength.h"
 #include "simulate/summary.h"
 
 namespace flexel::simulate {
@@ -304,10 +305,31 @@ std::vector<std::string> all_warnings(const SimulateResult& result, const std::v
   return all;
 }
 
+// Of several materials the largest stress may be far from its limit, and a smaller one beyond its own.
+Json strength_json(const SimulateResult& result, const Body& body, const std::vector<Material>& materials) {
+  Json json = Json::object();
+  std::vector<std::string> unknown;
+  const std::optional<StrengthSummary> found = nearest_to_strength(body, materials, unknown);
+  if (found && found->share <= 1 && result.stress->lacks_bending()) {
+    json["none"] = "walls under two cells thick do not show the stress of their bending";
+  } else if (found) {
+    json["share"] = found->share;
+    json["stress"] = found->stress;
+    json["limit"] = found->limit;
+    json["limit_is"] = found->yields ? "yield" : "strength";
+    json["at"] = vector(found->at);
+    json["part"] = found->part;
+    json["material"] = found->material;
+    if (found->layer_share) json["layer_share"] = *found->layer_share;
+  }
+  json["unknown"] = unknown;
+  return json;
+}
+
 }  // namespace
 
 std::string summary_json(const SimulateResult& result, const Body& body,
-                         const std::vector<std::string>& told) {
+                         const std::vector<Material>& materials, const std::vector<std::string>& told) {
   Json json;
   json["program"] = "flexel-simulate";
   json["version"] = version();
@@ -357,6 +379,7 @@ std::string summary_json(const SimulateResult& result, const Body& body,
       json["largest_von_mises_yield_share_bar"] = *bar;
     if (result.local_stress) json["largest_von_mises_local"] = local_stress_json(*result.local_stress);
     if (!result.no_local_stress.empty()) json["largest_von_mises_local_none"] = result.no_local_stress;
+    json["strength"] = strength_json(result, body, materials);
   }
   if (result.modes) json["shapes"] = modes_json(*result.modes);
   json.update(run_json(result));

@@ -4,13 +4,15 @@
 #include <vector>
 
 #include "formats/lattice/body.h"
+#include "simulate/input/materials.h"
 #include "simulate/result/result.h"
 
 namespace flexel::simulate {
 
-// The result as JSON (docs/reference/summary.md gives every key and unit). `told`: the warnings of the run that were printed;
-// they are in it, and those that the result alone gives.
+// The result as JSON (docs/reference/summary.md gives every key and unit). `body` is the deformed one, `materials` (parts) those of its parts.
+// `told`: the warnings of the run that were printed; they are in it, and those that the result alone gives.
 [[nodiscard]] std::string summary_json(const SimulateResult& result, const Body& body,
+                                       const std::vector<Material>& materials,
                                        const std::vector<std::string>& told = {});
 
 // The result in lines for people.

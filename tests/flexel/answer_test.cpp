@@ -5,6 +5,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/files/json.h"
+#include "simulate/summary.h"
+
 namespace flexel::commands {
 namespace {
 
@@ -22,6 +25,9 @@ struct Case {
     std::string all;
     for (const std::string& line : answer_lines(result, body, materials)) all += line + "\n";
     return all;
+  }
+  [[nodiscard]] nlohmann::ordered_json strength() const {
+    return parse_json(summary_json(result, body, materials))["strength"];
   }
 };
 
@@ -51,6 +57,22 @@ Case with_bar(double share) {
   result.stress = simulate::StressSummary{47e6, Vec3(0, 0, 0), "lever", 0.2};
   result.reactions.push_back({"xmin", Vec3(0, 1e-9, 5), Vec3(0, 0.4, 0)});
   return made;
+}
+
+// Beside it a knob of PLA, under 20 MPa.
+Case with_two_parts() {
+  Case two = with_bar(0.03);
+  Part knob;
+  knob.name = "knob";
+  knob.element_begin = 2;
+  knob.element_end = 3;
+  two.body.parts.push_back(knob);
+  two.body.rest.emplace_back(0.01, 0, 0);
+  two.body.element_columns["von_mises"].values.push_back(20e6);
+  simulate::Material plastic;
+  plastic.name = "PLA";
+  two.materials.push_back(plastic);
+  return two;
 }
 
 TEST(Answer, TheBarDecidesTheWords) {
@@ -140,22 +162,33 @@ TEST(Answer, HowNearToFailing) {
 
 // The part with the largest stress need not be the one that fails.
 TEST(Answer, TheWeakestPartCounts) {
-  Case two = with_bar(0.03);
-  Part knob;
-  knob.name = "knob";
-  knob.element_begin = 2;
-  knob.element_end = 3;
-  two.body.parts.push_back(knob);
-  two.body.rest.emplace_back(0.01, 0, 0);
-  two.body.element_columns["von_mises"].values.push_back(20e6);
-  simulate::Material plastic;
-  plastic.name = "PLA";
-  two.materials.push_back(plastic);
+  Case two = with_two_parts();
   EXPECT_THAT(two.text(), HasSubstr("steel yields"));
   EXPECT_THAT(two.text(), HasSubstr("unknown of PLA"));
   two.materials[1].strength = 40e6;
   EXPECT_THAT(two.text(),
               HasSubstr("safety factor 2: about 20 MPa of 40 MPa at which PLA breaks, at (10, 0, 0) mm"));
+}
+
+// The largest stress is the steel's, a fifth of its limit: a program that reads on needs the other part's too.
+TEST(Answer, TheSummaryHasTheWeakestPart) {
+  Case two = with_two_parts();
+  EXPECT_EQ(two.strength()["part"], "lever");
+  EXPECT_EQ(two.strength()["unknown"], nlohmann::ordered_json({"PLA"}));
+  two.materials[1].strength = 16e6;
+  const nlohmann::ordered_json found = two.strength();
+  EXPECT_EQ(found["share"], 1.25);
+  EXPECT_EQ(found["stress"], 20e6);
+  EXPECT_EQ(found["limit"], 16e6);
+  EXPECT_EQ(found["limit_is"], "strength");
+  EXPECT_EQ(found["part"], "knob");
+  EXPECT_EQ(found["material"], "PLA");
+  EXPECT_EQ(found["at"][0], 0.01);
+  EXPECT_TRUE(found["unknown"].empty());
+  two.materials[1].strength = 40e6;
+  two.result.stress->thin_walls = 0.9;  // what is safe without bending need not be
+  EXPECT_FALSE(two.strength().contains("share"));
+  EXPECT_TRUE(two.strength().contains("none"));
 }
 
 TEST(Answer, AtMostSixLinesHoweverMuchThereIs) {

@@ -12,6 +12,7 @@
 #include "simulate/matter/interface_points.h"
 #include "simulate/result/result.h"
 #include "simulate/scene/scene.h"
+#include "simulate/scene/strength.h"
 #include "simulate/summary.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/scene_case.h"
@@ -151,12 +152,13 @@ TEST(Bonds, NamedBondsBesideContact) {
 
 TEST(Bonds, SaysWhoIsBondedOverWhatArea) {
   Body body = bonded_bar(false, 5);
-  const SimulateResult result = simulate_quietly(body, pulled_scene(Vec3(0, 0, 1)));
+  const Scene scene = pulled_scene(Vec3(0, 0, 1));
+  const SimulateResult result = simulate_quietly(body, scene);
   ASSERT_EQ(result.bonds.size(), 1u);
   EXPECT_EQ(result.bonds[0].parts, (std::array<std::string, 2>{"near", "far"}));
   EXPECT_NEAR(result.bonds[0].area, 0.25, 1e-12);
   EXPECT_LT((result.reactions[0].force + Vec3(0, 0, 1)).norm(), 1e-6);
-  const std::string json = summary_json(result, body);
+  const std::string json = summary_json(result, body, known_materials(scene, body));
   EXPECT_THAT(json, HasSubstr("\"bonds\""));
 }
 

@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "simulate/probes/report.h"
 #include "simulate/result/result.h"
+#include "simulate/scene/strength.h"
 #include "simulate/summary.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/scene_case.h"
@@ -283,7 +284,8 @@ TEST(Torques, ThatTurnWhatTheyActOnAreTold) {
       ASSERT_EQ(warnings_of(result).size(), 1u);
       EXPECT_THAT(warnings_of(result)[0], ::testing::AllOf(HasSubstr("load \"end\""), HasSubstr("degrees"),
                                                            HasSubstr("% of its torque is left")));
-      EXPECT_THAT(summary_json(result, body), HasSubstr("% of its torque is left"));
+      EXPECT_THAT(summary_json(result, body, known_materials(scene, body)),
+                  HasSubstr("% of its torque is left"));
     }
   }
 }
