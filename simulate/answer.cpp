@@ -245,27 +245,30 @@ std::string strength(const SimulateResult& result, const Body& body, const std::
   return text;
 }
 
-// N, on the body of `size`, m: what planes bear is no reaction, but at rest all that loads and reactions lack. Zero:
-// no more than the tolerance leaves over.
-Vec3 borne_by_planes(const SimulateResult& result, double size) {
+// N, on the body in its `box` at rest: what planes bear is no reaction, but at rest all that loads and reactions lack. Zero:
+// no more than the tolerance leaves over, whose scale does not depend on how far the body is from the world's origin.
+Vec3 borne_by_planes(const SimulateResult& result, const Box& box) {
   if (!result.settled) return Vec3::Zero();
+  const Vec3 middle = 0.5 * (box.min + box.max);
   double scale = 0;
-  for (const AppliedLoad& load : result.loads) scale += load.force.norm() + load.moment.norm() / size;
-  for (const Reaction& reaction : result.reactions)
-    scale += reaction.force.norm() + reaction.moment.norm() / size;
+  const auto count = [&](const Vec3& force, const Vec3& moment) {
+    scale += force.norm() + (moment - middle.cross(force)).norm() / box.diagonal();
+  };
+  for (const AppliedLoad& load : result.loads) count(load.force, load.moment);
+  for (const Reaction& reaction : result.reactions) count(reaction.force, reaction.moment);
   if (!(result.imbalance.norm() > 10 * result.settled->tolerance * scale)) return Vec3::Zero();
   return -result.imbalance;
 }
 
 std::string held_by(const SimulateResult& result, const Body& body) {
-  const double size = bounding_box(body.rest).diagonal();
-  const Vec3 planes = borne_by_planes(result, size);
+  const Box box = bounding_box(body.rest);
+  const Vec3 planes = borne_by_planes(result, box);
   const std::string by_planes = planes.isZero(0) ? "" : "planes with " + directed(planes);
   if (result.reactions.empty()) return by_planes.empty() ? "nothing" : by_planes;
   std::string text;
   for (std::size_t r = 0; r < std::min(kNamed, result.reactions.size()); ++r)
     text += fmt::format("{}\"{}\" with {}", text.empty() ? "" : ", ", result.reactions[r].name,
-                        borne(result.reactions[r], size));
+                        borne(result.reactions[r], box.diagonal()));
   text += more(result.reactions.size());
   return by_planes.empty() ? text : text + ", " + by_planes;
 }

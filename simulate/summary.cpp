@@ -317,7 +317,7 @@ Json strength_json(const SimulateResult& result, const Body& body, const std::ve
     json["stress"] = found->stress;
     json["limit"] = found->limit;
     json["limit_is"] = found->yields ? "yield" : "strength";
-    json["at"] = vector(found->at);
+    json["at"] = vector(found->stress == result.stress->value ? result.stress->at : found->at);
     json["part"] = found->part;
     json["material"] = found->material;
     if (found->layer_share) json["layer_share"] = *found->layer_share;

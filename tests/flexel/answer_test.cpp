@@ -219,6 +219,10 @@ TEST(Answer, PlanesBearWhatLoadsAndReactionsLack) {
   EXPECT_THAT(made.text(), HasSubstr("held by    planes with 3 N along +z\n"));
   made.result.imbalance = Vec3(0, 0, -1e-5);
   EXPECT_THAT(made.text(), HasSubstr("held by    nothing\n"));
+  made.result.imbalance = Vec3(0, 0, -3);
+  for (Vec3& each : made.body.rest) each.x() += 1e4;  // far from the origin the load's moment is of its place
+  made.result.loads[0].moment = made.body.rest[0].cross(made.result.loads[0].force);
+  EXPECT_THAT(made.text(), HasSubstr("held by    planes with 3 N along +z\n"));
 }
 
 }  // namespace
