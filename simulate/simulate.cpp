@@ -292,6 +292,7 @@ SimulateResult Run::operator()() {
   measure_displacement(body_, state_, result);
   result.mass = mass_of(problem_);
   refuse_not_finite(result, scene_.name);
+  result.unknowns = count_unknowns(mechanics.constraints(), body_.element_count());
   result.load_steps = solved.load_steps;
   result.newton_iterations = solved.newton_iterations;
   result.cg_iterations = solved.cg_iterations;

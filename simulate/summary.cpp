@@ -251,6 +251,7 @@ Json run_json(const SimulateResult& result) {
                        {"kinetic_energy", result.settled->kinetic},
                        {"tolerance", result.settled->tolerance}};
   } else {
+    json["unknowns"] = result.unknowns;
     json["load_steps"] = result.load_steps;
     json["newton_iterations"] = result.newton_iterations;
     json["cg_iterations"] = result.cg_iterations;
@@ -288,11 +289,11 @@ std::string run_line(const SimulateResult& result) {
         human_count(result.settled->steps), result.seconds, result.settled->residual, result.settled->kinetic,
         result.elastic_energy, result.smallest_jacobian, corner);
   return fmt::format(
-      "elastic energy {:.4g} J{}, smallest J {:.4g}{}, {} load step(s), {} Newton and {} CG iterations, "
-      "residual {:.1e}, {:.2f} s",
+      "elastic energy {:.4g} J{}, smallest J {:.4g}{}, {} unknowns, {} load step(s), {} Newton and {} CG "
+      "iterations, residual {:.1e}, {:.2f} s",
       result.elastic_energy, bar_of(result, ErrorBar::Of::elastic_energy), result.smallest_jacobian, corner,
-      result.load_steps, result.newton_iterations, result.cg_iterations, result.relative_residual,
-      result.seconds);
+      human_count(result.unknowns), result.load_steps, result.newton_iterations, result.cg_iterations,
+      result.relative_residual, result.seconds);
 }
 
 // What was told has the scene's name before it.

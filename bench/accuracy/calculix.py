@@ -198,7 +198,8 @@ def calculix(case, folder, size):
         mean = (weights[:, None] * moved).sum(axis=0) / weights.sum()
     else:
         mean = moved[np.argmin(np.linalg.norm(mesh.rest - np.array(case.asked, float), axis=1))]
-    return np.linalg.norm(mean), seconds, memory, len(mesh.solids), mesh.seconds
+    held = sum(len(np.unique(mesh.triangles_on(case.faces[face][0]))) * len(axes) for face, axes in case.fix)
+    return np.linalg.norm(mean), seconds, memory, len(mesh.solids), mesh.seconds, 3 * len(mesh.points) - held
 
 
 # Flexel
@@ -255,7 +256,7 @@ name = "asked"
     found = json.loads((folder / "s.json").read_text())
     bars = found.get("error_bars", {}).get("bars", [])
     bar = next((each["bar"] for each in bars if each["of"] == "probe asked"), float("nan"))
-    iterations = f"{found['newton_iterations']}, {found['cg_iterations']}"
+    iterations = f"{found['unknowns']:,}; {found['newton_iterations']}, {found['cg_iterations']}"
     return np.linalg.norm(found["probes"][0]["displacement"]) * 1e3, bar * 1e3, first + second, max(memory, more), found["cells"], iterations
 
 
@@ -279,9 +280,9 @@ def run(name, quick):
         ours += [(" of model quadratic", times * case.spacings[0], flexel(case, folder, times * case.spacings[0], "quadratic"))
                  for times in ((4,) if quick else (4, 2))]
     reference = case.reference or limit([row[0] for row in rows])
-    for size, (value, seconds, memory, count, meshing) in zip(case.sizes, rows):
+    for size, (value, seconds, memory, count, meshing, unknowns) in zip(case.sizes, rows):
         print(f"| {name} | CalculiX, C3D10 of {size:g} mm | {count:,} | {100 * (value / reference - 1):+.2f} | | {meshing:.2f} | {seconds:.2f} |"
-              f" {memory:.0f} | |")
+              f" {memory:.0f} | {unknowns:,} |")
     for model, spacing, (value, bar, seconds, memory, cells, iterations) in ours:
         print(f"| {name} | Flexel, cells{model} of {spacing:g} mm | {cells:,} | {100 * (value / reference - 1):+.2f} | {'none' if math.isnan(bar) else f'{100 * bar / reference:.2f}'} |"
               f" | {seconds:.2f} | {memory:.0f} | {iterations} |", flush=True)
@@ -302,7 +303,7 @@ def main():
     if unknown or "--help" in sys.argv:
         print(__doc__ + "\nCases: " + ", ".join(CASES), file=sys.stderr)
         sys.exit(0 if "--help" in sys.argv else 2)
-    print("| part | by | elements, cells | error % | bar % | mesh s | s | MB | Newton, CG |\n|---|---|---|---|---|---|---|---|---|")
+    print("| part | by | elements, cells | error % | bar % | mesh s | s | MB | unknowns; Newton, CG |\n|---|---|---|---|---|---|---|---|---|")
     for name in wanted:
         run(name, "--quick" in sys.argv)
 

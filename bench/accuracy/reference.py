@@ -109,7 +109,7 @@ def values_of(name, sizes):
         case.geometry = plain + GRADING.format(held=held, re_entrant=", ".join(map(str, re_entrant)), at_held=HELD * size, slope=SLOPE,
                                                at_re_entrant=along_edges * size, round=round(ROUND * sizes[0] / size))
         with tempfile.TemporaryDirectory() as place:
-            value, seconds, memory, count, _ = calculix.calculix(case, pathlib.Path(place), size)
+            value, seconds, memory, count, _, _ = calculix.calculix(case, pathlib.Path(place), size)
         values.append(value)
         print(f"| {name} | {size:g} | {count:,} | {1e3 * value:.4f} | {seconds:.1f} | {memory:.0f} |", flush=True)
     return values

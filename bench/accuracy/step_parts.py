@@ -67,7 +67,7 @@ def row(part, cells, limit):
     value = largest["value"]
     note = errors.get("note", "") or (f"order {largest['order']:.1f}" if largest.get("order") else "no order")
     print(f"| {part.name} | {found['cells']:,} | {first[0]:.1f} | {second[0]:.1f} | {max(first[1], second[1]):.0f} |"
-          f" {found['newton_iterations']}, {found['cg_iterations']} | {metres(value)} | {metres(largest['bar'])} |"
+          f" {found['unknowns']:,}; {found['newton_iterations']}, {found['cg_iterations']} | {metres(value)} | {metres(largest['bar'])} |"
           f" {100 * largest['bar'] / value:.1f} | {note} |", flush=True)
 
 
@@ -85,7 +85,7 @@ def main():
     if not options.parts.is_dir():
         print(f"step_parts.py: {options.parts} is not there: give --parts DIR", file=sys.stderr)
         return 2
-    print("| part | cells | voxelize s | solve s | MB | Newton, CG | largest displacement | bar | bar % | said |")
+    print("| part | cells | voxelize s | solve s | MB | unknowns; Newton, CG | largest displacement | bar | bar % | said |")
     print("|---|---|---|---|---|---|---|---|---|---|")
     good = True
     for cells in options.cells.split(","):

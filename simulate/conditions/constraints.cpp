@@ -2,6 +2,8 @@
 // symmetrically.
 #include "simulate/conditions/constraints.h"
 
+#include <bit>
+
 #include "base/parallel.h"
 
 namespace flexel::simulate {
@@ -17,6 +19,13 @@ void apply(const Constraints& constraints, const Body& body, const State& state,
                                                  constraints.courses[motion].at(state));
       }
   });
+}
+
+std::size_t count_unknowns(const Constraints& constraints, std::size_t elements) {
+  std::size_t unknowns = 3 * elements;
+  for (const std::uint8_t axes : constraints.mask)
+    unknowns -= static_cast<std::size_t>(std::popcount(static_cast<unsigned>(axes & 7)));
+  return unknowns;
 }
 
 void clear_prescribed(const Constraints& constraints, std::vector<Vec3>& values) {

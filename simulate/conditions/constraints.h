@@ -30,6 +30,9 @@ struct Constraints {
 void apply(const Constraints& constraints, const Body& body, const State& state,
            std::vector<Vec3>& displacement);
 
+// Components of `elements` that are not prescribed.
+[[nodiscard]] std::size_t count_unknowns(const Constraints& constraints, std::size_t elements);
+
 // 0 in every prescribed component.
 void clear_prescribed(const Constraints& constraints, std::vector<Vec3>& values);
 

@@ -131,7 +131,8 @@ void refuse_too_large(const QuadraticSystem& system, const Body& body, const std
       scene);
 }
 
-void count_work(const QuadraticSolution& solution, SimulateResult& result) {
+void count_work(const QuadraticSystem& system, const QuadraticSolution& solution, SimulateResult& result) {
+  result.unknowns = 3 * system.nodes().size();  // supports hold by Nitsche's method: nothing is prescribed
   result.load_steps = std::max(solution.load_steps, 1);
   result.newton_iterations = solution.newton_iterations + 1;
   result.cg_iterations = solution.iterations;
@@ -360,7 +361,7 @@ SimulateResult run_quadratic(Body& body, const Scene& scene, const SimulateOptio
   if (linear_reach != nullptr) *linear_reach = result.largest_displacement / solution.amplification;
   result.mass = mass_of(problem);
   refuse_not_finite(result, scene.name);
-  count_work(solution, result);
+  count_work(system, solution, result);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   share_time(effects, solving, options.explain, result, progress);
   answered.reset();

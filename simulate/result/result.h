@@ -125,6 +125,7 @@ struct ModesSummary {       // of a run with [run] modes or buckling
 struct SolverCounts {
   int load_steps = 0, newton_iterations = 0, cg_iterations = 0;
   int start_newton_iterations = 0;  // the most on a coarser lattice that the run started from
+  std::size_t unknowns = 0;         // displacements of nodes along an axis that nothing prescribes
   double relative_residual = 0;
   double seconds = 0;
 };

@@ -2,6 +2,7 @@
 // transverse force spread over the end at x = 2.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "simulate/result/result.h"
@@ -75,6 +76,10 @@ TEST(Beam, SmallLoadTakesTwoNewtonIterations) {
   const SimulateResult result = simulate_quietly(body, cantilever(0.3, kForce * Vec3::UnitZ()));
   EXPECT_LE(result.newton_iterations, 2);
   EXPECT_LE(result.relative_residual, 1e-8);
+  const auto held =
+      std::count_if(body.rest.begin(), body.rest.end(), [](const Vec3& at) { return at.x() < 1e-9; });
+  EXPECT_GT(held, 0);
+  EXPECT_EQ(result.unknowns, 3 * (body.element_count() - static_cast<std::size_t>(held)));
 }
 
 TEST(Beam, ReactionsBalanceTheLoad) {
