@@ -43,7 +43,7 @@ constexpr Exponents kLength{1}, kVolume{3}, kMass{0, 1}, kTime{0, 0, 1}, kAngle{
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kPoundForce = 4.4482216152605;  // N, exact: 0.45359237 kg x 9.80665 m/s^2
 constexpr double kIcePoint = 273.15, kFahrenheit = 5. / 9, kFahrenheitZero = 459.67 * 5 / 9;  // K
-constexpr double kPsi = kPoundForce / (0.0254 * 0.0254);                                      // Pa
+constexpr double kSquareInch = 0.0254 * 0.0254, kPsi = kPoundForce / kSquareInch;             // m^2, Pa
 
 constexpr NamedUnit kNamedUnits[] = {
     {"m", true, false, {1, 0, kLength}},
