@@ -204,7 +204,7 @@ def test_deform_writes_a_page():
 
 
 def test_a_page_that_is_too_large_does_not_take_the_result_along():
-    columns = range(490)
+    columns = range(600)
     corners = [(x, y, z) for x in (0, 40) for y in (0, 10) for z in (0, 10)]
     quads = ["0 1 3 2", "4 6 7 5", "0 4 5 1", "2 3 7 6", "0 2 6 4", "1 5 7 3"]
     head = ["ply", "format ascii 1.0", "element vertex 8", *(f"property float {axis}" for axis in "xyz"), *(f"property float column{n}" for n in columns),
