@@ -1,7 +1,7 @@
 // Quantities with units. A unit is a product of named units with prefixes and powers ("kN/mm^2", "kg m^-3",
-// "Nm"); its dimension is found by adding exponents, so that no list of all spellings is needed. Powers of
-// ten are kept apart from the rest of a factor: "3 mm" is 3 / 1000, rounded once, and so equals 0.003 to the
-// bit.
+// "W/(m K)", "Nm"); its dimension is found by adding exponents, so that no list of all spellings is needed.
+// Powers of ten are kept apart from the rest of a factor: "3 mm" is 3 / 1000, rounded once, and so equals
+// 0.003 to the bit.
 #include "base/units.h"
 
 #include <fmt/format.h>
@@ -18,8 +18,8 @@
 namespace flexel {
 namespace {
 
-// Exponents of length, mass, time, angle.
-using Exponents = std::array<int, 4>;
+// Exponents of length, mass, time, angle, temperature.
+using Exponents = std::array<int, 5>;
 
 // factor = mantissa * 10^decimals
 struct Unit {
@@ -33,14 +33,17 @@ struct NamedUnit {
   bool prefixed;  // takes SI prefixes
   bool word;      // written out: any case, plural with s
   Unit unit;
+  double zero = 0;  // of a scale of temperatures, K
 };
 
-constexpr Exponents kLength{1, 0, 0, 0}, kVolume{3, 0, 0, 0}, kMass{0, 1, 0, 0}, kTime{0, 0, 1, 0},
-    kAngle{0, 0, 0, 1}, kForce{1, 1, -2, 0}, kTorque{2, 1, -2, 0}, kPressure{-1, 1, -2, 0}, kShare{};
+constexpr Exponents kLength{1}, kVolume{3}, kMass{0, 1}, kTime{0, 0, 1}, kAngle{0, 0, 0, 1}, kForce{1, 1, -2},
+    kTorque{2, 1, -2}, kPressure{-1, 1, -2}, kShare{}, kTemperature{0, 0, 0, 0, 1}, kPower{2, 1, -3},
+    kConductivity{1, 1, -3, 0, -1}, kHeatTransfer{0, 1, -3, 0, -1};
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kPoundForce = 4.4482216152605;           // N, exact: 0.45359237 kg x 9.80665 m/s^2
-constexpr double kPsi = kPoundForce / (0.0254 * 0.0254);  // Pa
+constexpr double kPoundForce = 4.4482216152605;  // N, exact: 0.45359237 kg x 9.80665 m/s^2
+constexpr double kIcePoint = 273.15, kFahrenheit = 5. / 9, kFahrenheitZero = 459.67 * 5 / 9;  // K
+constexpr double kSquareInch = 0.0254 * 0.0254, kPsi = kPoundForce / kSquareInch;             // m^2, Pa
 
 constexpr NamedUnit kNamedUnits[] = {
     {"m", true, false, {1, 0, kLength}},
@@ -95,6 +98,18 @@ constexpr NamedUnit kNamedUnits[] = {
     {"ksi", false, false, {kPsi, 3, kPressure}},
     {"%", false, false, {1, -2, kShare}},
     {"percent", false, true, {1, -2, kShare}},
+    {"ppm", false, false, {1, -6, kShare}},
+    {"K", true, false, {1, 0, kTemperature}},
+    {"kelvin", true, true, {1, 0, kTemperature}},
+    {"degC", false, false, {1, 0, kTemperature}, kIcePoint},
+    {"C", false, false, {1, 0, kTemperature}, kIcePoint},
+    {"degF", false, false, {kFahrenheit, 0, kTemperature}, kFahrenheitZero},
+    {"F", false, false, {kFahrenheit, 0, kTemperature}, kFahrenheitZero},
+    {"W", true, false, {1, 0, kPower}},
+    {"watt", true, true, {1, 0, kPower}},
+    // As tables of materials write them: K by itself, no millikelvin.
+    {"W/mK", false, false, {1, 0, kConductivity}},
+    {"W/m2K", false, false, {1, 0, kHeatTransfer}},
 };
 
 struct Prefix {
@@ -113,10 +128,11 @@ struct DimensionEntry {
   std::vector<std::string> units;
 };
 
-const DimensionEntry& entry(Dimension dimension) {
-  static const std::vector<DimensionEntry> entries = {
+// In the order of Dimension. Where two have the same exponents, kind() names the first.
+const std::vector<DimensionEntry>& entries() {
+  static const std::vector<DimensionEntry> all = {
       {"a length", kLength, "2 mm", {"mm", "cm", "m", "um", "nm", "km", "in", "ft", "mil", "yd"}},
-      {"an area", {2, 0, 0, 0}, "4 mm^2", {"mm^2", "cm^2", "m^2", "in^2"}},
+      {"an area", {2}, "4 mm^2", {"mm^2", "cm^2", "m^2", "in^2"}},
       {"a volume", kVolume, "8 mm^3", {"mm^3", "cm^3", "m^3", "l", "ml", "in^3"}},
       {"a mass", kMass, "50 g", {"g", "kg", "mg", "t", "lb", "oz"}},
       {"a time", kTime, "10 ms", {"s", "ms", "us", "min", "h"}},
@@ -124,22 +140,27 @@ const DimensionEntry& entry(Dimension dimension) {
       {"a force", kForce, "5 N", {"N", "kN", "mN", "MN", "lbf", "kgf"}},
       {"a torque", kTorque, "5 N m", {"N m", "Nm", "Nmm", "N mm", "kN m", "lbf in"}},
       {"a pressure", kPressure, "2 MPa", {"Pa", "kPa", "MPa", "GPa", "N/mm^2", "bar", "psi", "ksi"}},
-      {"a density", {-3, 1, 0, 0}, "7850 kg/m^3", {"kg/m^3", "g/cm^3", "t/m^3", "lb/in^3"}},
-      {"a velocity", {1, 0, -1, 0}, "2 m/s", {"m/s", "mm/s", "km/h"}},
-      {"an acceleration", {1, 0, -2, 0}, "9.81 m/s^2", {"m/s^2", "mm/s^2"}},
+      {"a density", {-3, 1}, "7850 kg/m^3", {"kg/m^3", "g/cm^3", "t/m^3", "lb/in^3"}},
+      {"a velocity", {1, 0, -1}, "2 m/s", {"m/s", "mm/s", "km/h"}},
+      {"an acceleration", {1, 0, -2}, "9.81 m/s^2", {"m/s^2", "mm/s^2"}},
       {"an energy", kTorque, "3 J", {"J", "mJ", "kJ", "N m"}},
       {"a share", kShare, "30 %", {"%"}},
-      {"a gravitational constant", {3, -1, -2, 0}, "6.674e-11 m^3/kg/s^2", {"m^3/kg/s^2", "N m^2/kg^2"}},
+      {"a gravitational constant", {3, -1, -2}, "6.674e-11 m^3/kg/s^2", {"m^3/kg/s^2", "N m^2/kg^2"}},
+      {"a temperature", kTemperature, "20 degC", {"degC", "K", "degF"}},
+      {"a difference of temperatures", kTemperature, "80 K", {"K", "degC", "degF"}},
+      {"a temperature gradient", {-1, 0, 0, 0, 1}, "500 K/m", {"K/m", "K/mm", "K/cm"}},
+      {"a coefficient of expansion", {0, 0, 0, 0, -1}, "12e-6 /K", {"/K", "1/K", "um/(m K)", "ppm/K"}},
+      {"a power", kPower, "5 W", {"W", "mW", "kW"}},
+      {"a heat flux", {0, 1, -3}, "1000 W/m2", {"W/m2", "kW/m2", "W/cm2", "W/mm2"}},
+      {"a conductivity", kConductivity, "50 W/(m K)", {"W/(m K)", "mW/(mm K)"}},
+      {"a coefficient of heat transfer", kHeatTransfer, "10 W/(m2 K)", {"W/(m2 K)"}},
   };
-  return entries[static_cast<std::size_t>(dimension)];
+  return all;
 }
 
-constexpr Dimension kDimensions[] = {
-    Dimension::length,  Dimension::area,     Dimension::volume,
-    Dimension::mass,    Dimension::time,     Dimension::angle,
-    Dimension::force,   Dimension::torque,   Dimension::pressure,
-    Dimension::density, Dimension::velocity, Dimension::acceleration,
-    Dimension::energy,  Dimension::share,    Dimension::gravitational_constant};
+const DimensionEntry& entry(Dimension dimension) {
+  return entries()[static_cast<std::size_t>(dimension)];
+}
 
 std::string lower(std::string_view text) {
   std::string result(text);
@@ -218,15 +239,22 @@ std::optional<Unit> parse_factor(std::string_view text) {
   return power(*unit, exponent);
 }
 
-// Factors joined by "*", " " or "/"; a "/" divides by the one factor after it.
-std::optional<Unit> parse_unit(std::string_view text) {
-  const std::string spelled = plain_spelling(trim(text));
-  std::string_view rest = spelled;
+// Factors joined by "*", " " or "/"; a "/" divides by the one factor after it, or by what is in parentheses
+// there. One may begin it: "/K", "1/K".
+std::optional<Unit> parse_product(std::string_view rest, bool within_parentheses) {
   Unit result;
-  bool divide = false;
+  bool divide = !within_parentheses && (rest.starts_with("/") || rest.starts_with("1/"));
+  if (divide) rest = trim(rest.substr(rest.find('/') + 1));
   while (!rest.empty()) {
-    const std::size_t end = std::min(rest.find_first_of("*/ "), rest.size());
-    const std::optional<Unit> factor = parse_factor(rest.substr(0, end));
+    std::optional<Unit> factor;
+    std::size_t end = std::min(rest.find_first_of("*/ "), rest.size());
+    if (!within_parentheses && rest.front() == '(') {
+      end = std::min(rest.find(')'), rest.size() - 1) + 1;
+      factor = parse_product(trim(rest.substr(1, end - 2)), true);
+      if (rest[end - 1] != ')') return std::nullopt;
+    } else {
+      factor = parse_factor(rest.substr(0, end));
+    }
     if (!factor) return std::nullopt;
     result = product(result, divide ? power(*factor, -1) : *factor);
     rest = rest.substr(end);
@@ -242,6 +270,21 @@ std::optional<Unit> parse_unit(std::string_view text) {
   return std::nullopt;
 }
 
+std::optional<Unit> parse_unit(std::string_view text) {
+  const std::string spelled = plain_spelling(trim(text));
+  const std::optional<Unit> whole = find_unit(spelled);
+  return whole ? whole : parse_product(spelled, false);
+}
+
+// Where the scale of a temperature begins, K; nothing for what is no scale ("K/m*m").
+std::optional<double> zero_of_scale(std::string_view text) {
+  const std::string spelled = plain_spelling(trim(text));
+  for (const NamedUnit& unit : kNamedUnits)
+    if (named(unit, spelled)) return unit.zero;
+  if (find_unit(spelled)) return 0;  // with a prefix
+  return std::nullopt;
+}
+
 double scaled(double value, const Unit& unit) {
   const double product = value * unit.mantissa;
   return unit.decimals < 0 ? product / std::pow(10.0, -unit.decimals)
@@ -252,8 +295,7 @@ std::string hint(std::string_view name, Dimension dimension) {
   std::vector<std::string> all = unit_names(dimension);
   const std::string own = did_you_mean(std::string(name), all);
   if (!own.empty()) return own;
-  for (const Dimension other : kDimensions)
-    for (const std::string& unit : unit_names(other)) all.push_back(unit);
+  for (const DimensionEntry& other : entries()) all.insert(all.end(), other.units.begin(), other.units.end());
   const std::string any = did_you_mean(std::string(name), all);
   return any.empty() ? fmt::format("; units of {} are {}", dimension_name(dimension),
                                    fmt::join(unit_names(dimension), ", "))
@@ -262,8 +304,8 @@ std::string hint(std::string_view name, Dimension dimension) {
 
 // "a force", or "not a length" where the exponents are those of no dimension.
 std::string kind(const Exponents& exponents, Dimension wanted) {
-  for (const Dimension dimension : kDimensions)
-    if (entry(dimension).exponents == exponents) return entry(dimension).name;
+  for (const DimensionEntry& known : entries())
+    if (known.exponents == exponents) return known.name;
   return fmt::format("not {}", entry(wanted).name);
 }
 
@@ -299,12 +341,19 @@ double parse_quantity(std::string_view text, Dimension dimension) {
                       std::abs(number) > 1 ? "large" : "small"));
     return number;
   };
-  if (name.empty() && (value == 0 || dimension == Dimension::share)) return within(value);
+  const bool absolute = dimension == Dimension::temperature;
+  if (name.empty() && ((value == 0 && !absolute) || dimension == Dimension::share)) return within(value);
   if (name.empty())
     throw InputError(
         fmt::format("\"{}\" has no unit: write {} such as \"{}\"", whole, wanted.name, wanted.example));
   const double result = scaled(value, unit_of(name, whole, dimension));
-  return within(result);
+  if (!absolute) return within(result);
+  const std::optional<double> zero = zero_of_scale(name);
+  if (!zero)
+    throw InputError(
+        fmt::format("\"{}\" is on no scale of temperatures; write such as \"{}\"", whole, wanted.example));
+  if (result + *zero < 0) throw InputError(fmt::format("\"{}\" is below absolute zero", whole));
+  return within(result + *zero);
 }
 
 double length_unit(std::string_view name) {
@@ -320,6 +369,10 @@ const char* dimension_name(Dimension dimension) {
   while (*name++ != ' ') {
   }
   return name;
+}
+
+const char* dimension_example(Dimension dimension) {
+  return entry(dimension).example;
 }
 
 }  // namespace flexel

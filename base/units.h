@@ -21,13 +21,21 @@ enum class Dimension {
   acceleration,
   energy,
   share,
-  gravitational_constant
+  gravitational_constant,
+  temperature,  // absolute
+  temperature_difference,
+  temperature_gradient,
+  expansion,
+  power,
+  heat_flux,
+  conductivity,
+  heat_transfer
 };
 
 // The value of `text` in the SI unit of `dimension` (radians for angles; "30 %" is 0.3 for shares). A number
 // is required before a unit. Throws InputError: not a number, no unit where one is needed (a share needs
-// none), an unknown unit (with the nearest), a unit of another dimension, not finite. `0` alone is accepted
-// for every dimension.
+// none), an unknown unit (with the nearest), a unit of another dimension, not finite, a temperature below
+// absolute zero. `0` alone is accepted for every dimension but temperature, whose zero is the unit's.
 [[nodiscard]] double parse_quantity(std::string_view text, Dimension dimension);
 
 // Metres per unit of a length unit's name: "mm", "cm", "m", "in", "inch", "ft", "um", "millimetre" ... Throws
@@ -37,6 +45,7 @@ enum class Dimension {
 // The units a dimension accepts, for messages and documentation.
 [[nodiscard]] std::vector<std::string> unit_names(Dimension dimension);
 [[nodiscard]] const char* dimension_name(Dimension dimension);
+[[nodiscard]] const char* dimension_example(Dimension dimension);  // "2 mm"
 
 // A quantity for people: 3 to 4 significant digits and a fitting SI prefix ("1.84 mm", "210 GPa", "34.2 MB"
 // for bytes).

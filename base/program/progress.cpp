@@ -24,7 +24,7 @@ namespace {
 
 ProgressListener* listener = nullptr;
 SilentUpdate silent_update = nullptr;
-bool bar_shown = false;  // by any Progress, on the last line of the terminal
+const Progress* bar_of = nullptr;  // whose bar is on the last line of the terminal
 bool brief_output = false, holds_warnings = false, keeps_warnings = false;
 std::vector<std::string> held_warnings, kept_warnings;
 std::string held_program;  // that gave the last of them
@@ -41,7 +41,7 @@ void print_error(const std::string& text) {
 }
 
 void erase_bar() {
-  if (std::exchange(bar_shown, false)) print_error("\r\033[K");
+  if (std::exchange(bar_of, nullptr) != nullptr) print_error("\r\033[K");
 }
 
 Progress::Mode resolve(Progress::Mode mode) {
@@ -115,7 +115,7 @@ Progress::Progress(std::string program, Mode mode) : program_(std::move(program)
 Progress::~Progress() {
   // A stage that an exception ended was not finished.
   if (std::uncaught_exceptions() > 0)
-    clear_bar();
+    clear_own_bar();
   else
     finish();
 }
@@ -150,13 +150,13 @@ void Progress::update(double share, const std::string& note) {
   const std::size_t columns = terminal_columns();
   if (line.size() >= columns) line.resize(columns - 1);  // a wrapped line could not be rewritten
   print_error("\r" + line + "\033[K");
-  bar_drawn_ = bar_shown = true;
+  bar_of = this;
 }
 
 void Progress::say(const std::string& line) {
   if (mode_ == Mode::quiet || mode_ == Mode::silent || brief_output) return;
   if (listener != nullptr) return listener->say(line);
-  clear_bar();
+  erase_bar();  // of whichever Progress: this may be a run within a run, or around one
   print_error(fmt::format("{}: {}\n", program_, printable(line)));
 }
 
@@ -172,12 +172,12 @@ void Progress::warn(const std::string& line) {
   }
   if (keeps_warnings) add_to(kept_warnings);
   if (listener != nullptr) return listener->warn(line);
-  erase_bar();  // of whichever Progress: this may be a run within a run
+  erase_bar();
   print_error(fmt::format("{}: warning: {}\n", program_, printable(line)));
 }
 
 void Progress::finish() {
-  clear_bar();
+  clear_own_bar();
   if (mode_ == Mode::lines && listener == nullptr && !stage_.empty() && !brief_output) {
     const double seconds = now() - stage_began_;
     print_error(fmt::format("{}: {}: {:.{}f} s\n", program_, stage_, seconds, seconds < 1 ? 4 : 2));
@@ -185,9 +185,8 @@ void Progress::finish() {
   stage_.clear();
 }
 
-void Progress::clear_bar() {
-  if (bar_drawn_) erase_bar();
-  bar_drawn_ = false;
+void Progress::clear_own_bar() {
+  if (bar_of == this) erase_bar();
 }
 
 }  // namespace flexel

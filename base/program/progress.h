@@ -52,11 +52,10 @@ class Progress {
   void finish();
 
  private:
-  void clear_bar();
+  void clear_own_bar();
   std::string program_;
   Mode mode_;
   std::string stage_;
-  bool bar_drawn_ = false;
   double stage_began_ = 0;
   double last_drawn_ = -1;
 };

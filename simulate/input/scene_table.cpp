@@ -30,31 +30,6 @@ const char* kind_name(SceneValue::Kind kind) {
   return "a date or time";
 }
 
-namespace {
-
-// A quantity that a message can show for a dimension: `"2 mm"`.
-std::string example_of(Dimension dimension) {
-  const std::vector<std::string> units = unit_names(dimension);
-  switch (dimension) {
-    case Dimension::length:
-      return "2 mm";
-    case Dimension::force:
-      return "5 N";
-    case Dimension::pressure:
-      return "2 MPa";
-    case Dimension::angle:
-      return "30 deg";
-    case Dimension::density:
-      return "7850 kg/m3";
-    case Dimension::acceleration:
-      return "9.81 m/s2";
-    default:
-      return units.empty() ? "1" : "1 " + units.front();
-  }
-}
-
-}  // namespace
-
 TableReader::TableReader(const SceneValue& table, std::string file, std::string title)
     : table_(&table), file_(std::move(file)), title_(std::move(title)) {
   if (table.kind != SceneValue::Kind::table)
@@ -107,14 +82,15 @@ std::optional<double> TableReader::number(const std::string& key) {
 
 double TableReader::to_quantity(const SceneValue& value, Dimension dimension, const std::string& key) const {
   if (value.kind == SceneValue::Kind::number) {
-    if (value.number == 0) return 0;
+    if (value.number == 0 && dimension != Dimension::temperature) return 0;
     if (dimension == Dimension::share && std::isfinite(value.number)) return value.number;
     fail(value.line, fmt::format("\"{}\" in {} is a bare number; it needs a unit of {}, for example \"{}\"",
-                                 key, title_, dimension_name(dimension), example_of(dimension)));
+                                 key, title_, dimension_name(dimension), dimension_example(dimension)));
   }
   if (value.kind != SceneValue::Kind::string)
-    fail(value.line, fmt::format("\"{}\" in {} is {}; it needs to be a {}, for example \"{}\"", key, title_,
-                                 kind_name(value.kind), dimension_name(dimension), example_of(dimension)));
+    fail(value.line,
+         fmt::format("\"{}\" in {} is {}; it needs to be a {}, for example \"{}\"", key, title_,
+                     kind_name(value.kind), dimension_name(dimension), dimension_example(dimension)));
   try {
     return parse_quantity(value.text, dimension);
   } catch (const InputError& error) {
@@ -131,7 +107,7 @@ std::optional<double> TableReader::quantity(const std::string& key, Dimension di
 Vec3 TableReader::to_vector(const SceneValue& value, Dimension dimension, const std::string& key) const {
   if (value.kind != SceneValue::Kind::array || value.items.size() != 3)
     fail(value.line, fmt::format("\"{}\" in {} needs three values [x, y, z], for example [\"{}\", 0, 0]", key,
-                                 title_, example_of(dimension)));
+                                 title_, dimension_example(dimension)));
   Vec3 result;
   for (int axis = 0; axis < 3; ++axis)
     result[axis] = to_quantity(value.items[static_cast<std::size_t>(axis)], dimension, key);

@@ -190,15 +190,12 @@ std::vector<SceneKey> joint_keys() {
 std::vector<SceneKey> thermal_keys() {
   const std::string t = "[thermal]", s = "[shrinkage]", m = "[materials.NAME]";
   const std::string fixed = "[[temperature]]", heat = "[[heat]]", air = "[[convection]]";
-  return {{t, "change", K::quantity, {}, "0", "of the temperature, \"80 K\""},
-          {t, "gradient", K::list, {}, "0", "of the temperature, \"500 K/m\" along x, y, z"},
+  return {{t, "change", K::quantity, D::temperature_difference, "0", "of the temperature, \"80 K\""},
+          {t, "gradient", K::vector, D::temperature_gradient, "0",
+           "of the temperature, \"500 K/m\" along x, y, z"},
           {t, "about", K::vector, D::length, "the origin", "where the gradient gives nothing"},
           {t, "column", K::text, {}, "", "temperatures [K] of the body's elements or cells"},
-          {t,
-           "reference",
-           K::quantity,
-           {},
-           "",
+          {t, "reference", K::quantity, D::temperature, "",
            "of column and conduction: where the part has its shape, \"20 degC\""},
           {t, "part", K::text, {}, "every part", "a part's name"},
           {s, "axis", K::direction, {}, "[0, 0, 1]", "that layers are stacked along"},
@@ -210,17 +207,17 @@ std::vector<SceneKey> thermal_keys() {
           {s, "part", K::text, {}, "every part", "a part's name"},
           {fixed, "where", K::selection, {}, "required", "a face that has the temperature"},
           {fixed, "name", K::text, {}, "the selection", "for the summary"},
-          {fixed, "value", K::quantity, {}, "required", "\"100 degC\""},
+          {fixed, "value", K::quantity, D::temperature, "required", "\"100 degC\""},
           {heat, "where", K::selection, {}, "required", "a face that heat comes in by"},
           {heat, "name", K::text, {}, "the selection", "for the summary"},
-          {heat, "flux", K::quantity, {}, "", "\"1000 W/m2\""},
-          {heat, "power", K::quantity, {}, "", "\"5 W\", in total"},
+          {heat, "flux", K::quantity, D::heat_flux, "", "\"1000 W/m2\""},
+          {heat, "power", K::quantity, D::power, "", "\"5 W\", in total"},
           {air, "where", K::selection, {}, "required", "a face that a fluid touches"},
           {air, "name", K::text, {}, "the selection", "for the summary"},
-          {air, "coefficient", K::quantity, {}, "required", "\"10 W/(m2 K)\""},
-          {air, "ambient", K::quantity, {}, "required", "temperature of the fluid, \"20 degC\""},
-          {m, "expansion", K::quantity, {}, "the library's", "\"12e-6 /K\""},
-          {m, "conductivity", K::quantity, {}, "the library's", "\"50 W/(m K)\""}};
+          {air, "coefficient", K::quantity, D::heat_transfer, "required", "\"10 W/(m2 K)\""},
+          {air, "ambient", K::quantity, D::temperature, "required", "temperature of the fluid, \"20 degC\""},
+          {m, "expansion", K::quantity, D::expansion, "the library's", "\"12e-6 /K\""},
+          {m, "conductivity", K::quantity, D::conductivity, "the library's", "\"50 W/(m K)\""}};
 }
 
 std::vector<SceneKey> contact_keys() {

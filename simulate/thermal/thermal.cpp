@@ -7,24 +7,23 @@
 
 #include "base/error.h"
 #include "simulate/input/scene_selection.h"
-#include "simulate/thermal/thermal_quantity.h"
 
 namespace flexel::simulate {
 namespace {
 
-using D = ThermalDimension;
+using D = Dimension;
 
 TemperatureChange parse_change(TableReader& reader) {
   TemperatureChange entry;
   entry.origin = reader.place();
-  const std::optional<double> change = thermal_quantity(reader, "change", D::difference);
-  const std::optional<Vec3> gradient = thermal_vector(reader, "gradient", D::gradient);
+  const std::optional<double> change = reader.quantity("change", D::temperature_difference);
+  const std::optional<Vec3> gradient = reader.vector("gradient", D::temperature_gradient);
   const std::optional<Vec3> about = reader.vector("about", Dimension::length);
   entry.change = change.value_or(0);
   entry.gradient = gradient.value_or(Vec3::Zero());
   entry.about = about.value_or(Vec3::Zero());
   entry.column = reader.text("column").value_or("");
-  entry.reference = thermal_quantity(reader, "reference", D::temperature);
+  entry.reference = reader.quantity("reference", D::temperature);
   entry.part = reader.text("part");
   reader.finish();
   if (!change && !gradient && !entry.reference)
@@ -80,17 +79,16 @@ HeatFace parse_face(TableReader& reader, HeatFace::Kind kind) {
   face.name = reader.text("name").value_or(describe(face.where));
   const auto required = [&](const char* key, D dimension, const char* example) {
     (void)reader.require(key, example);
-    return *thermal_quantity(reader, key, dimension);
+    return *reader.quantity(key, dimension);
   };
   if (kind == HeatFace::Kind::temperature) {
     face.value = required("value", D::temperature, "\"100 degC\"");
   } else if (kind == HeatFace::Kind::convection) {
-    face.value = required("coefficient", D::film, "\"10 W/(m2 K)\"");
+    face.value = required("coefficient", D::heat_transfer, "\"10 W/(m2 K)\"");
     face.ambient = required("ambient", D::temperature, "\"20 degC\"");
     if (!(face.value > 0)) reader.fail("\"coefficient\" needs to be above 0");
   } else {
-    const auto flux = thermal_quantity(reader, "flux", D::flux),
-               power = thermal_quantity(reader, "power", D::power);
+    const auto flux = reader.quantity("flux", D::heat_flux), power = reader.quantity("power", D::power);
     if (flux.has_value() == power.has_value())
       reader.fail(
           "[[heat]] needs either \"flux\" (\"1000 W/m2\", into the part) or \"power\" (\"5 W\", in total)");
@@ -108,8 +106,8 @@ void parse_figures(TableReader& scene, ThermalSettings& settings) {
     if (value.kind != SceneValue::Kind::table) continue;
     TableReader reader(value, scene.file(), fmt::format("[materials.{}]", name));
     ThermalFigures figures;
-    figures.expansion = thermal_quantity(reader, "expansion", D::expansion);
-    figures.conductivity = thermal_quantity(reader, "conductivity", D::conductivity);
+    figures.expansion = reader.quantity("expansion", D::expansion);
+    figures.conductivity = reader.quantity("conductivity", D::conductivity);
     if (figures.conductivity && !(*figures.conductivity > 0))
       reader.fail("\"conductivity\" needs to be above 0");
     settings.materials[name] = figures;

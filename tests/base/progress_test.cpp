@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <memory>
 #include <string>
 #include <vector>
@@ -85,6 +86,31 @@ TEST(Progress, AWarningOfARunWithinARunErasesTheBar) {
   }
   EXPECT_NE(testing::internal::GetCapturedStderr().find("\r\033[Kflexel: warning: told\n"),
             std::string::npos);
+}
+
+TEST(Progress, ALineErasesTheBarOfWhicheverRun) {
+  testing::internal::CaptureStderr();
+  {
+    Progress whole("flexel", Progress::Mode::bar);
+    Progress inner("flexel", Progress::Mode::bar);
+    inner.stage("bars");
+    whole.say("told");
+    whole.say("once more");
+  }
+  EXPECT_NE(testing::internal::GetCapturedStderr().find("\r\033[Kflexel: told\nflexel: once more\n"),
+            std::string::npos);
+}
+
+TEST(Progress, ARunThatEndsLeavesTheBarOfAnother) {
+  testing::internal::CaptureStderr();
+  {
+    Progress whole("flexel", Progress::Mode::bar);
+    whole.stage("bars");
+    { const Progress silent("flexel", Progress::Mode::silent), quiet("flexel", Progress::Mode::quiet); }
+    std::fputs("|", stderr);
+  }
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_EQ(said.substr(said.find('|')), "|\r\033[K");
 }
 
 TEST(Progress, OfAQuietRunNoUpdateIsHeard) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <tuple>
 
 #include "base/error.h"
 
@@ -11,6 +12,8 @@ namespace flexel {
 namespace {
 
 using testing::HasSubstr;
+
+constexpr int kLast = static_cast<int>(Dimension::heat_transfer);
 
 std::string quantity_failure(const std::string& text, Dimension dimension) {
   try {
@@ -39,6 +42,43 @@ TEST(Units, EqualWhatTheyShouldToTheBit) {
   EXPECT_DOUBLE_EQ(parse_quantity("1 lbf/in^2", Dimension::pressure), 6894.757293168361);
 }
 
+TEST(Units, TemperaturesHaveAZeroAndTheirDifferencesNone) {
+  for (const char* freezing : {"0 degC", "273.15 K", "32 degF", "0 C", "32 F",
+                               "0 \xC2\xB0"
+                               "C",
+                               "273150 mK"})
+    EXPECT_DOUBLE_EQ(parse_quantity(freezing, Dimension::temperature), 273.15) << freezing;
+  EXPECT_EQ(parse_quantity("20 degC", Dimension::temperature_difference), 20);
+  EXPECT_EQ(parse_quantity("-300 degC", Dimension::temperature_difference), -300);
+  EXPECT_EQ(parse_quantity("18 degF", Dimension::temperature_difference), 10);
+  EXPECT_EQ(parse_quantity("5 K/mm", Dimension::temperature_gradient), 5000);
+  EXPECT_THAT(quantity_failure("-300 degC", Dimension::temperature), HasSubstr("below absolute zero"));
+  EXPECT_THAT(quantity_failure("-1 K", Dimension::temperature), HasSubstr("below absolute zero"));
+  EXPECT_THAT(quantity_failure("0", Dimension::temperature), HasSubstr("has no unit"));
+  for (const char* no_scale : {"20 degC^1", "20 K m/m", "20 (K)", "20 1/K^-1"})
+    EXPECT_NE(quantity_failure(no_scale, Dimension::temperature), "") << no_scale;
+}
+
+TEST(Units, OfHeat) {
+  const std::vector<std::tuple<Dimension, double, std::vector<const char*>>> same = {
+      {Dimension::expansion,
+       12e-6,
+       {"12e-6 /K", "12e-6/K", "12e-6 1/K", "12 ppm/K", "12 um/(m K)", "12 um/m/K", "12e-6 K^-1"}},
+      {Dimension::conductivity,
+       50,
+       {"50 W/(m K)", "50 W/(m*K)", "50 W/m/K", "50 W/mK", "50 mW/(mm K)", "50 W m^-1 K^-1"}},
+      {Dimension::heat_transfer, 10, {"10 W/(m2 K)", "10 W/(m^2 K)", "10 W/m2/K", "10 W/m2K", "10 kg/s^3/K"}},
+      {Dimension::heat_flux, 1000, {"1000 W/m2", "1000 W/m^2", "1 kW/m2", "1e-3 W/mm2", "0.1 W/cm2"}},
+      {Dimension::power, 5, {"5 W", "5000 mW", "5 J/s", "5 watts", "0.005 kW"}}};
+  for (const auto& [dimension, value, spellings] : same)
+    for (const char* text : spellings) EXPECT_DOUBLE_EQ(parse_quantity(text, dimension), value) << text;
+  EXPECT_THAT(quantity_failure("50 W/m2", Dimension::conductivity),
+              HasSubstr("is a heat flux; a conductivity"));
+  for (const char* wrong : {"5 W/(m K", "5 W/m K)", "5 W/()", "5 W/((m K))", "5 W/(m K)2", "5 W/(/m K)",
+                            "5 W//(m K)", "5 (W", "5 ("})
+    EXPECT_NE(quantity_failure(wrong, Dimension::conductivity), "") << wrong;
+}
+
 TEST(Units, SpellingsOfOneUnitAgree) {
   const std::vector<std::vector<std::string>> spellings = {
       {"2.5 um", "2.5um", " 2.5 \xC2\xB5m ", "2.5 \xCE\xBCm", "+2.5 micron", "2.5 Micrometres",
@@ -56,14 +96,17 @@ TEST(Units, SpellingsOfOneUnitAgree) {
 }
 
 TEST(Units, EveryListedNameIsReadAndEveryOtherDimensionRefusesIt) {
-  for (int d = 0; d <= static_cast<int>(Dimension::share); ++d) {
+  for (int d = 0; d <= kLast; ++d) {
     const Dimension dimension = static_cast<Dimension>(d);
     for (const std::string& name : unit_names(dimension)) {
       EXPECT_GT(parse_quantity("1 " + name, dimension), 0) << name;
-      for (int o = 0; o <= static_cast<int>(Dimension::share); ++o) {
+      for (int o = 0; o <= kLast; ++o) {
         const Dimension other = static_cast<Dimension>(o);
-        const bool same_kind = o == d || (dimension == Dimension::torque && other == Dimension::energy) ||
-                               (dimension == Dimension::energy && other == Dimension::torque);
+        const auto are = [&](Dimension one, Dimension two) {
+          return (dimension == one && other == two) || (dimension == two && other == one);
+        };
+        const bool same_kind = o == d || are(Dimension::torque, Dimension::energy) ||
+                               are(Dimension::temperature, Dimension::temperature_difference);
         if (same_kind) continue;
         EXPECT_THAT(quantity_failure("1 " + name, other), HasSubstr("is needed")) << name;
       }
@@ -102,8 +145,11 @@ TEST(Units, WhatIsNotAFiniteQuantityIsRefused) {
 }
 
 TEST(Units, ZeroNeedsNoUnit) {
-  for (int d = 0; d <= static_cast<int>(Dimension::share); ++d)
-    for (const char* zero : {"0", "0.0", "-0"}) EXPECT_EQ(parse_quantity(zero, static_cast<Dimension>(d)), 0);
+  for (int d = 0; d <= kLast; ++d) {
+    const Dimension dimension = static_cast<Dimension>(d);
+    if (dimension == Dimension::temperature) continue;
+    for (const char* zero : {"0", "0.0", "-0"}) EXPECT_EQ(parse_quantity(zero, dimension), 0);
+  }
 }
 
 TEST(Units, LengthUnits) {

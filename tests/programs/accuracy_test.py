@@ -86,7 +86,7 @@ def test_the_bar_of_a_load_on_a_narrow_region_holds():
     for width, sizes in ((1, (1.4, 0.5)), (2, (1.4, 0.7))):
         block_with_patch(width)
         found = []
-        for size in (*sizes, 0.25):
+        for size in (*sizes, 0.3):
             summary, said = deform(["block.obj", "--material", "PLA", "--fix", "block/bottom", "--push", "block/patch: 0 0 -10 N", "--probe",
                                     "block/patch", "--size", f"{size}mm"])
             bars = {bar["of"]: bar for bar in summary["simulate"]["error_bars"]["bars"]}
@@ -165,12 +165,12 @@ def test_every_model_answers_in_six_lines():
 
 
 def test_a_guess_is_called_one():
-    """A plate of 0.6 mm on cells of 1.5 mm: its bar is larger than its value."""
-    write("plate.stl", binary_stl(box_triangles((60, 40, 0.6))))
+    """A plate two cells thick: its bar is nearly its value."""
+    write("plate.stl", binary_stl(box_triangles((30, 20, 0.6))))
     _, said = deform(["plate.stl", "--material", "steel", "--fix", "xmin", "--push", "xmax: 0 0 -1 N", "--size", "0.3mm"])
     answer = box(said)
     sure = answer["how sure"]
-    expect(("first guess" in answer["how far"]) == sure.startswith("hardly") or sure.startswith("not known"), said)
+    expect("first guess" in answer["how far"] and sure.startswith("hardly"), said)
 
 
 def test_verbose_and_quiet():
@@ -215,18 +215,18 @@ def test_a_column_about_to_buckle_is_told():
 def test_a_strip_bent_to_its_length_has_not_buckled():
     """Its answer begins from a coarser lattice's, so the first linear step is a correction: not the answer in proportion to the load.
     One cell thick, its stress lacks the bending: no safety factor is made of it."""
-    write("strip.stl", binary_stl(box_triangles((100, 10, 1))))
+    write("strip.stl", binary_stl(box_triangles((100, 3, 1))))
     for size, strength in (("0.355 mm", "TOO WEAK"), ("1 mm", "not known: walls under two cells")):
-        result = expect_ok(run("flexel", "deform", "strip.stl", "--fix", "xmin", "--push", "xmax: 0 0 -2 N", "--material", "PLA",
+        result = expect_ok(run("flexel", "deform", "strip.stl", "--fix", "xmin", "--push", "xmax: 0 0 -0.6 N", "--material", "PLA",
                                "--model", "cells", "--size", size, "-o", "bent.stl"))
         expect("buckle" not in result.err, result.err)
         expect(f"strength   {strength}" in result.err, result.err)
 
 
 def hollow_box():
-    """120 x 40 x 40 mm with walls of 3 mm."""
-    inner = [[(x + 3, y + 3, z + 3) for x, y, z in reversed(triangle)] for triangle in box_triangles((114, 34, 34))]
-    write("hollow.stl", binary_stl([*box_triangles((120, 40, 40)), *inner]))
+    """60 x 25 x 25 mm with walls of 3 mm."""
+    inner = [[(x + 3, y + 3, z + 3) for x, y, z in reversed(triangle)] for triangle in box_triangles((54, 19, 19))]
+    write("hollow.stl", binary_stl([*box_triangles((60, 25, 25)), *inner]))
     return ["hollow.stl", "--model", "cells", "--material", "PLA", "--fix", "xmin", "--push", "xmax: 0 0 -10 N"]
 
 

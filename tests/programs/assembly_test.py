@@ -128,7 +128,7 @@ def test_a_press_fit_presses_as_a_pin_that_swells():
         expect(abs(left[0] + right[0]) < .01 * max(1, abs(left[0])), f"{left} {right}")
         return left[0]
 
-    load = '[[load]]\nwhere = "fitted-2/zmax"\nforce = ["0 N", "0 N", "-1 mN"]\n'
+    load = '[[load]]\nwhere = "fitted-2/zmax"\nforce = ["0 N", "0 N", "-100 mN"]\n'
     at_once = 'material = "PLA"\ncontact = true\n' + load
     let_out = 'material = "PLA"\n[contact]\noverlap = "part"\noverlap_time = "20 ms"\n' + load
     swollen = pushes(3, SWOLLEN)
@@ -136,7 +136,8 @@ def test_a_press_fit_presses_as_a_pin_that_swells():
         # of 50 um a fifth is the soft part, and of what is left contact's own yielding takes a share
         pressed = pushes(3.05, text)
         expect(.5 < pressed / swollen < .85, f"{pressed} N, swollen {swollen} N: {text}")
-        expect(abs(pushes(3, text)) < .01 * swollen, f"a pin that just fits presses nothing: {text}")
+    # in contact at once: test_a_bolt_that_fills_its_hole_is_no_press_fit
+    expect(abs(pushes(3, let_out)) < .01 * swollen, "a pin that just fits presses nothing")
 
 
 def test_a_fit_that_facets_hide_is_told():

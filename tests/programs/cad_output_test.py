@@ -1,5 +1,6 @@
 """STEP, IGES and BREP out: the part's own faces, deformed, read by other tools; and what is refused."""
 
+import functools
 import json
 import math
 import os
@@ -28,15 +29,24 @@ def bent(name="bent.vtu", size="3mm", text=BEND, part=None):
     return name
 
 
+@functools.cache
+def info_of(part, written):
+    return expect_ok(run("flexel", "info", part)).out.decode()
+
+
+def info(part):
+    """What `flexel info` shows of the file as it is now."""
+    return info_of(part, os.stat(part).st_mtime_ns)
+
+
 def faces(part):
     """(number, area in mm^2, name) of each face that `flexel info` shows."""
-    text = expect_ok(run("flexel", "info", part)).out.decode()
-    found = re.findall(r"^  \S+/(\d+) +([\d.]+)  \(.*?\) +(.*)$", text, re.M)
+    found = re.findall(r"^  \S+/(\d+) +([\d.]+)  \(.*?\) +(.*)$", info(part), re.M)
     return [(int(number), float(area), (re.search(r'called "(.*)"', what) or [None, ""])[1]) for number, area, what in found]
 
 
 def volume(part):
-    return float(re.search(r"volume +([\d,.]+) mm", expect_ok(run("flexel", "info", part)).out.decode())[1].replace(",", ""))
+    return float(re.search(r"volume +([\d,.]+) mm", info(part))[1].replace(",", ""))
 
 
 def vertices(step):
@@ -46,11 +56,31 @@ def vertices(step):
     return [points[number] for number in re.findall(r"VERTEX_POINT\('[^']*', *#(\d+)\)", text)]
 
 
-def test_the_same_faces_come_back_bent():
+def bent_as(*names):
+    """Writes bent.vtu, with two threads, in each format, and report.json; what was said of the last."""
+    for name in names:
+        said = expect_ok(run("flexel-map", "bent.vtu", "-o", name, "--report", "report.json", "--threads", "2", "--force")).err
+    return said
+
+
+def test_one_bent_part_in_every_format():
+    """The same faces come back bent, from one lattice, as STEP, IGES and BREP."""
     bent()
-    said = expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.step", "--report", "report.json")).err
+    the_same_faces_come_back(bent_as("bent.step"))
+    corners_are_where_points_go()
+    said = bent_as("bent.igs", "bent.brep")
+    expect("names of bracket.step do not come along: BREP has no room" in said, said)
+    iges_and_brep_hold_the_same()
+    the_bytes_do_not_depend_on_threads_or_time()
+    notes_do_not_come_along()
+    if shutil.which("gmsh"):
+        size, report = volume_of_tetrahedra("bent.step"), json.loads(pathlib.Path("report.json").read_text())
+        expect(abs(1e-9 * size / report["volume_after"] - 1) < 1e-3, f"gmsh meshes it: {size} mm^3, {report}")
+
+
+def the_same_faces_come_back(said):
     expect(re.search(r"STEP: 1 solid of 11 faces, \d+ as before, the others within .* of the deformation", said), said)
-    expect("valid, also when read again" in said, said)
+    expect("valid, also when read again" in said and "do not come along" not in said, said)
     before, after = faces("bracket.step"), faces("bent.step")
     expect([each[0::2] for each in before] == [each[0::2] for each in after], f"numbers and names: {before} {after}")
     report = json.loads(pathlib.Path("report.json").read_text())
@@ -59,32 +89,139 @@ def test_the_same_faces_come_back_bent():
     expect(pathlib.Path("bent.step").read_text().count("AUTOMOTIVE_DESIGN") == pathlib.Path("bracket.step").read_text().count("AUTOMOTIVE_DESIGN"), "schema")
 
 
+def corners_are_where_points_go():
+    """flexel-map --points moves the corners without any CAD library."""
+    at_rest, moved = vertices("bracket.step"), vertices("bent.step")
+    write("corners.csv", "x,y,z\n" + "".join(f"{x!r},{y!r},{z!r}\n" for x, y, z in at_rest))
+    expect_ok(run("flexel-map", "bent.vtu", "--points", "corners.csv", "-o", "moved.csv", "--quiet"))
+    lines = pathlib.Path("moved.csv").read_text().splitlines()[1:]
+    wanted = [tuple(map(float, line.split(",")[:3])) for line in lines]
+    expect(len(wanted) == len(moved) and len(moved) >= 18, f"{len(wanted)} corners and {len(moved)}")
+    tolerance = 1e-4 * math.dist((0, 0, 0), (80, 40, 60))
+    for corner in wanted:
+        expect(min(math.dist(corner, each) for each in moved) < tolerance, f"no corner near {corner}")
+    expect(max(math.dist(a, b) for a, b in zip(at_rest, wanted)) > 10, "hardly anything moved")
+
+
+def iges_and_brep_hold_the_same():
+    wanted = volume("bent.step")
+    for name in ("bent.igs", "bent.brep"):
+        found, there = volume(name), faces(name)
+        expect(abs(found / wanted - 1) < 1e-4, f"{name}: {found} {wanted}")
+        expect(len(there) == 11, f"{name}: {there}")
+    expect([each[2] for each in faces("bent.igs")] == [each[2] for each in faces("bracket.step")], "names of faces in IGES")
+
+
+def the_bytes_do_not_depend_on_threads_or_time():
+    """One thread, a second later; and a name that is not UTF-8 is a name."""
+    time.sleep(max(0, os.path.getmtime("bent.brep") + 1.1 - time.time()))
+    for kind in ("step", "igs", "brep"):
+        again = os.fsdecode(b"again\xff." + kind.encode())
+        expect_ok(run("flexel-map", "bent.vtu", "-o", again, "--threads", "1", "--quiet"))
+        expect(pathlib.Path(again).read_bytes() == pathlib.Path(f"bent.{kind}").read_bytes(), f"bytes of {kind}")
+
+
+def notes_do_not_come_along():
+    """Of bracket.step with two notes, which becomes the part of another lattice."""
+    text = pathlib.Path("bracket.step").read_text()
+    last = max(map(int, re.findall(r"#(\d+) *=", text)))
+    write("noted.step", text.replace("ENDSEC;\nEND-ISO", f"#{last + 1}=DRAUGHTING_CALLOUT('a =DATUM(',());\n#{last + 2}=DRAUGHTING_CALLOUT('',());\nENDSEC;\nEND-ISO"))
+    expect_ok(run("flexel-voxelize", "noted.step", "--size", "8mm", "-o", "noted.vtu", "--quiet"))
+    said = expect_ok(run("flexel-map", "noted.vtu", "-o", "again.step")).err
+    expect("(PMI: 2 entities as DRAUGHTING_CALLOUT) of noted.step do not come along" in said, said)
+
+
+def test_iges_and_brep_are_sources():
+    bent(size="6mm")
+    bent_as("bent.igs", "bent.brep")
+    for name in ("bent.igs", "bent.brep"):
+        bent(size="6mm", part=name, text='material = "pla"\n[[fix]]\nwhere = "zmax"\n[[move]]\nwhere = "zmin"\ndisplacement = ["3 mm", "0 mm", "0 mm"]\n', name="again.vtu")
+        expect_ok(run("flexel-map", "again.vtu", "-o", "again." + name.rsplit(".")[1], "--quiet"))
+
+
 def test_one_run_tells_the_faces_it_wrote():
+    """Of several CAD files of one run, which are one fit."""
     part = bracket()
-    said = expect_ok(run("flexel", "deform", part, "--material", "pla", "--fix", "bracket/1", "--push", "bracket/2: 0 0 -200 N", "--size", "4mm", "--no-estimate", "-o", "bent.step",
-                         "-o", "bent.brep", "--summary", "summary.json")).err
-    lines = re.findall(r"faces +(STEP|BREP): 1 solid of 11 faces, (\d+) as before, the others within (\S+) (\S+) of the deformation \(bracket/(\d+)\); valid, also when read again", said)
-    expect([each[0] for each in lines] == ["STEP", "BREP"], said)
+    words = ("flexel", "deform", part, "--material", "pla", "--fix", "bracket/1", "--push", "bracket/2: 0 0 -200 N", "--size", "5mm", "--no-estimate")
+    said = expect_ok(run(*words, "-o", "bent.step", "-o", "bent.brep", "-o", "again.step", "-o", "bent.igs", "--summary", "summary.json")).err
+    lines = re.findall(r"faces +(STEP|BREP|IGES): 1 solid of 11 faces, (\d+) as before, the others within (\S+) (\S+) of the deformation \(bracket/(\d+)\); valid, also when read again", said)
+    expect([each[0] for each in lines] == ["STEP", "BREP", "STEP", "IGES"], said)
     found = json.loads(pathlib.Path("summary.json").read_text())["cad"]
     for line, file in zip(lines, found, strict=True):
         metres = float(line[2]) * {"nm": 1e-9, "um": 1e-6, "mm": 1e-3}[line[3]]
         expect(abs(file["deviation"] / metres - 1) < 0.01 and file["deviation_face"] == f"bracket/{line[4]}", f"{line} {file}")
         expect(file["faces_kept"] == int(line[1]) and file["deviation"] <= file["tolerance"] and file["valid"] and not file["missed"], f"{file}")
-        expect(pathlib.Path(file["file"]).suffix[1:] == file["format"], f"{file}")
+        expect(file["format"] == {".igs": "iges"}.get(suffix := pathlib.Path(file["file"]).suffix, suffix[1:]), f"{file}")
         expect(abs(file["volume_after"] * 1e9 / volume(file["file"]) - 1) < 1e-3, f"{file}")
-
-
-def test_several_cad_files_of_one_run_are_one_fit():
-    part = bracket()
-    words = ("flexel", "deform", part, "--material", "pla", "--fix", "bracket/1", "--push", "bracket/2: 0 0 -200 N", "--size", "4mm", "--no-estimate", "--quiet")
-    expect_ok(run(*words, "-o", "alone.igs"))
-    expect_ok(run(*words, "-o", "bent.step", "-o", "bent.brep", "-o", "again.step", "-o", "bent.igs"))
+    expect(abs(volume("bent.brep") / volume("bent.step") - 1) < 1e-6, "the same solid")
     read = lambda name: pathlib.Path(name).read_bytes()
     expect(read("bent.step") == read("again.step"), "one format, one file")
+    said = expect_ok(run(*words, "--verbose", "-o", "alone.igs")).err
     expect(read("bent.igs") == read("alone.igs"), "what else is written changes nothing")
-    expect(abs(volume("bent.brep") / volume("bent.step") - 1) < 1e-6, "the same solid")
-    said = expect_ok(run(*words[:-1], "--verbose", "-o", "bent.step")).err
     expect(said.count("also when read again") == 1, f"said once: {said}")
+
+
+def test_what_a_writer_refuses_or_warns_of():
+    """Tolerances, --strict, a scale, options that are for meshes, and a missing flexel-cad, of one bent part."""
+    bent(size="6mm")
+    a_tolerance_is_kept_or_told()
+    a_folded_part_is_told_and_not_written_with_strict()
+    said = expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.step", "--scale", "0.5", "--strict", "--force")).err
+    expect("volume of the faces" not in said, f"a scale is no fault: {said}")
+    options_that_are_for_meshes_are_refused()
+    a_missing_worker_is_one_line()
+
+
+def a_tolerance_is_kept_or_told():
+    size = {}
+    for tolerance in ("1e-3", "20um", "1e-5"):
+        said = expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.step", "--tolerance", tolerance, "--force")).err
+        expect("warning" not in said, said)
+        size[tolerance] = os.path.getsize("bent.step")
+    expect(size["1e-3"] < size["20um"] < size["1e-5"], f"sizes {size}")
+    expect_error(run("flexel-map", "bent.vtu", "-o", "bent.step", "--tolerance", "1e-9", "--force"), "flexel-map", "--tolerance", "diagonal")
+    os.remove("bent.step")
+
+
+def a_folded_part_is_told_and_not_written_with_strict():
+    folded = ("flexel-map", "bent.vtu", "--scale", "-40", "--tolerance", "1e-3")
+    said = expect_ok(run(*folded, "-o", "folded.step")).err
+    expect("turns space inside out at bracket/" in said, said)
+    expect_error(run(*folded, "-o", "bent.step", "--strict", "--report", "report.json"), "flexel-map", code=4)
+    expect(pathlib.Path("report.json").exists() and not pathlib.Path("bent.step").exists(), "the report, and no part in spite of --strict")
+
+
+def options_that_are_for_meshes_are_refused():
+    map_step = ("flexel-map", "bent.vtu", "-o", "x.step")
+    expect_error(run(*map_step, "--crack", "cap"), "flexel-map", "--crack", "write a mesh")
+    expect_error(run(*map_step, "--attributes"), "flexel-map", "--attributes")
+    expect_error(run(*map_step, "--ascii"), "flexel-map", "--ascii")
+    expect_error(run(*map_step, "--unit", "inch"), "flexel-map", "--unit")
+    expect_error(run(*map_step, "--method", "gram-schmidt"), "flexel-map", "gram-schmidt", "blended")
+    expect_error(run(*map_step, "--onto", "bracket.step"), "flexel-map", "--onto")
+    for tolerance in ("0", "-1", "nan", "2", "3 kg", "soon"):
+        expect_error(run(*map_step, f"--tolerance={tolerance}"), "flexel-map")
+    expect_error(run("flexel-map", "bent.vtu", "-o", "x.stl", "--tolerance", "1e-4"), "flexel-map", "--tolerance")
+    expect(not list(pathlib.Path().glob("x.*")), "something was written")
+
+
+def a_missing_worker_is_one_line():
+    """flexel-cad is the one program that loads OpenCASCADE."""
+    os.mkdir("bin")
+    shutil.copy(BIN / "flexel-map", "bin/flexel-map")
+    shutil.copy(BIN / "flexel-voxelize", "bin/flexel-voxelize")
+    expect_error(run("./bin/flexel-map", "bent.vtu", "-o", "x.step"), "flexel-map", "flexel-cad", "install")
+    expect_error(run("./bin/flexel-voxelize", "bracket.step", "--size", "3mm", "-o", "x.vtu"), "flexel-voxelize", "flexel-cad")
+    expect_ok(run("./bin/flexel-map", "bent.vtu", "-o", "x.stl", "--quiet"))
+    os.mkdir("libexec"), os.mkdir("libexec/flexel")
+    os.symlink(BIN / "flexel-cad", "libexec/flexel/flexel-cad")
+    expect_ok(run("./bin/flexel-map", "bent.vtu", "-o", "x.step", "--quiet"))
+    os.remove("libexec/flexel/flexel-cad")
+    write("libexec/flexel/flexel-cad", "#!/bin/sh\nexit 127\n")
+    os.chmod("libexec/flexel/flexel-cad", 0o755)
+    expect_error(run("./bin/flexel-voxelize", "bracket.step", "--size", "3mm", "-o", "x.vtu"), "flexel-voxelize", "does not start", "install")
+    alone = run("flexel-cad", stdin=b"no job")
+    expect(alone.code == 127 and "run by the other programs" in alone.err, str(alone))
 
 
 def test_of_a_brep_file_in_inches_each_format_has_its_own_unit():
@@ -117,29 +254,6 @@ def test_colours_and_levels_of_iges_come_out_again():
     expect("property uchar red" in pathlib.Path("second.ply").read_text(errors="replace"), "colours of a mesh")
 
 
-def test_a_name_that_is_not_utf_8_is_a_name():
-    bent()
-    name = os.fsdecode(b"bent\xff.brep")
-    expect_ok(run("flexel-map", "bent.vtu", "-o", name))
-    expect(pathlib.Path(name).stat().st_size > 0, "written")
-
-
-def test_corners_are_where_points_go():
-    """flexel-map --points moves the corners without any CAD library."""
-    bent()
-    expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.step", "--quiet"))
-    at_rest, moved = vertices("bracket.step"), vertices("bent.step")
-    write("corners.csv", "x,y,z\n" + "".join(f"{x!r},{y!r},{z!r}\n" for x, y, z in at_rest))
-    expect_ok(run("flexel-map", "bent.vtu", "--points", "corners.csv", "-o", "moved.csv", "--quiet"))
-    lines = pathlib.Path("moved.csv").read_text().splitlines()[1:]
-    wanted = [tuple(map(float, line.split(",")[:3])) for line in lines]
-    expect(len(wanted) == len(moved) and len(moved) >= 18, f"{len(wanted)} corners and {len(moved)}")
-    tolerance = 1e-4 * math.dist((0, 0, 0), (80, 40, 60))
-    for corner in wanted:
-        expect(min(math.dist(corner, each) for each in moved) < tolerance, f"no corner near {corner}")
-    expect(max(math.dist(a, b) for a, b in zip(at_rest, wanted)) > 10, "hardly anything moved")
-
-
 def volume_of_tetrahedra(step):
     """mm^3, of gmsh's tetrahedra; whatever the unit of the file."""
     import meshio
@@ -149,15 +263,6 @@ def volume_of_tetrahedra(step):
     read = meshio.read("mesh.msh")
     p = read.points[numpy.concatenate([block.data for block in read.cells if block.type == "tetra"])]
     return abs(numpy.einsum("ij,ij->i", numpy.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), p[:, 3] - p[:, 0])).sum() / 6
-
-
-def test_gmsh_meshes_it():
-    need("gmsh")
-    bent()
-    expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.step", "--report", "report.json", "--quiet"))
-    volumes = [volume_of_tetrahedra("bracket.step"), volume_of_tetrahedra("bent.step")]
-    report = json.loads(pathlib.Path("report.json").read_text())
-    expect(abs(volumes[1] / volumes[0] - report["volume_after"] / report["volume_before"]) < 1e-3, f"{volumes} {report['volume_after']}")
 
 
 # Run in FreeCAD's own interpreter: valid, solids, volume, and the names that its importer shows.
@@ -217,35 +322,6 @@ Part.Face(Part.Wire(curve.toShape())).extrude(FreeCAD.Vector(5, 0, 60)).exportSt
     expect(abs(size / 1e9 / report["volume_after"] - 1) < 3e-3, f"{size} mm^3, {1e9 * report['volume_after']} in triangles")
 
 
-def test_what_does_not_come_along_is_told():
-    part = bracket()
-    text = pathlib.Path(part).read_text()
-    expect("do not come along" not in expect_ok(run("flexel-map", bent(), "-o", "bent.step")).err, "nothing is lost")
-    said = expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.brep")).err
-    expect("names of bracket.step do not come along: BREP has no room" in said, said)
-    last = max(map(int, re.findall(r"#(\d+) *=", text)))
-    write("bracket.step", text.replace("ENDSEC;\nEND-ISO", f"#{last + 1}=DRAUGHTING_CALLOUT('a =DATUM(',());\n#{last + 2}=DRAUGHTING_CALLOUT('',());\nENDSEC;\nEND-ISO"))
-    expect_ok(run("flexel-voxelize", "bracket.step", "--size", "4mm", "-o", "rest.vtu", "--quiet"))
-    expect_ok(run("flexel-simulate", "scene.toml", "rest.vtu", "-o", "noted.vtu", "--no-estimate", "--quiet"))
-    said = expect_ok(run("flexel-map", "noted.vtu", "-o", "noted.step")).err
-    expect("(PMI: 2 entities as DRAUGHTING_CALLOUT) of bracket.step do not come along" in said, said)
-
-
-def test_iges_and_brep_hold_the_same():
-    bent()
-    expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.step", "--quiet"))
-    wanted = volume("bent.step")
-    for name in ("bent.igs", "bent.brep"):
-        expect_ok(run("flexel-map", "bent.vtu", "-o", name, "--quiet"))
-        found, there = volume(name), faces(name)
-        expect(abs(found / wanted - 1) < 1e-4, f"{name}: {found} {wanted}")
-        expect(len(there) == 11, f"{name}: {there}")
-    expect([each[2] for each in faces("bent.igs")] == [each[2] for each in faces("bracket.step")], "names of faces in IGES")
-    for name in ("bent.igs", "bent.brep"):  # and they are sources in their turn
-        bent(part=name, text='material = "pla"\n[[fix]]\nwhere = "zmax"\n[[move]]\nwhere = "zmin"\ndisplacement = ["3 mm", "0 mm", "0 mm"]\n', name="again.vtu")
-        expect_ok(run("flexel-map", "again.vtu", "-o", "again." + name.rsplit(".")[1], "--quiet"))
-
-
 def test_a_pipe_carries_the_file():
     bracket()
     scene(text=BEND)
@@ -255,13 +331,6 @@ def test_a_pipe_carries_the_file():
     expect(len(faces("one.step")) == 11, "faces")
 
 
-def test_the_bytes_do_not_depend_on_threads_or_time():
-    bent()
-    for threads in (1, 2):
-        expect_ok(run("flexel-map", "bent.vtu", "-o", f"bent{threads}.step", "--threads", threads, "--quiet"))
-    expect(pathlib.Path("bent1.step").read_bytes() == pathlib.Path("bent2.step").read_bytes(), "bytes at 1 and 2 threads")
-
-
 def test_what_moves_as_one_stays_a_plane():
     turned = 'material = "pla"\n[[move]]\nwhere = { box = { min = ["-1 m", "-1 m", "-1 m"], max = ["1 m", "1 m", "1 m"] } }\nrotation = { axis = [1, 2, 3], through = ["0 mm", "0 mm", "0 mm"], angle = "70 deg" }\n'
     bent(text=turned)
@@ -269,26 +338,6 @@ def test_what_moves_as_one_stays_a_plane():
     expect("11 faces, all as before, moved; valid" in said, said)
     text = pathlib.Path("bent.step").read_text()
     expect(text.count("CYLINDRICAL_SURFACE") == 3 and text.count(" PLANE") >= 8 and "B_SPLINE_SURFACE" not in text, "surfaces")
-
-
-def test_a_tolerance_is_kept_or_told():
-    bent()
-    size = {}
-    for tolerance in ("1e-3", "20um", "1e-6"):
-        said = expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.step", "--tolerance", tolerance)).err
-        expect("warning" not in said, said)
-        size[tolerance] = os.path.getsize("bent.step")
-    expect(size["1e-3"] < size["1e-6"], f"sizes {size}")
-    expect_error(run("flexel-map", "bent.vtu", "-o", "bent.step", "--tolerance", "1e-9"), "flexel-map", "--tolerance", "diagonal")
-
-
-def test_a_folded_part_is_told_and_not_written_with_strict():
-    bent()
-    said = expect_ok(run("flexel-map", "bent.vtu", "-o", "folded.step", "--scale", "-40")).err
-    expect("turns space inside out at bracket/" in said, said)
-    refused = run("flexel-map", "bent.vtu", "-o", "bent.step", "--scale", "-40", "--strict")
-    expect_error(refused, "flexel-map", code=4)
-    expect(not pathlib.Path("bent.step").exists(), "a file in spite of --strict")
 
 
 def test_a_dent_smaller_than_the_face_is_in_the_file():
@@ -313,35 +362,12 @@ displacement = ["0 mm", "0 mm", "-0.4 mm"]
     expect(near[:, 2].min() < .006 - .0003, f"the dent is {1e3 * (.006 - near[:, 2].min())} mm deep")
 
 
-def test_a_scale_is_no_fault():
-    bent()
-    said = expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.step", "--scale", "0.5", "--strict")).err
-    expect("volume of the faces" not in said, said)
-
-
-def test_strict_leaves_the_report():
-    bent()
-    refused = run("flexel-map", "bent.vtu", "-o", "bent.step", "--scale", "-40", "--strict", "--report", "report.json")
-    expect_error(refused, "flexel-map", code=4)
-    expect(pathlib.Path("report.json").exists() and not pathlib.Path("bent.step").exists(), "the report, and no part")
-
-
-def test_bytes_are_the_same_a_second_later():
-    bent()
-    for turn in (1, 2):
-        for kind in ("brep", "step", "igs"):
-            expect_ok(run("flexel-map", "bent.vtu", "-o", f"bent{turn}.{kind}", "--quiet"))
-        time.sleep(1.1 if turn == 1 else 0)
-    for kind in ("brep", "step", "igs"):
-        expect(pathlib.Path(f"bent1.{kind}").read_bytes() == pathlib.Path(f"bent2.{kind}").read_bytes(), f"bytes of {kind}")
-
-
 def test_brep_in_other_units():
-    bent()
+    bent(size="6mm")
     expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.brep", "--quiet"))
     moved = 'material = "pla"\n[[fix]]\nwhere = "zmax"\n[[move]]\nwhere = "zmin"\ndisplacement = ["3 cm", "0 mm", "0 mm"]\n'
     scene(text=moved)
-    expect_ok(run("flexel-voxelize", "bent.brep", "--unit", "cm", "--count", "3000", "-o", "rest.vtu", "--quiet"))
+    expect_ok(run("flexel-voxelize", "bent.brep", "--unit", "cm", "--count", "1000", "-o", "rest.vtu", "--quiet"))
     expect_ok(run("flexel-simulate", "scene.toml", "rest.vtu", "-o", "big.vtu", "--no-estimate", "--quiet"))
     before = volume("bent.brep")
     for name in ("big.step", "big.iges"):
@@ -370,11 +396,11 @@ def test_assemblies_keep_their_parts_and_colours():
         raise Skip("no real parts here")
     text = 'material = "steel"\n[[fix]]\nwhere = "plate/zmin"\n[[move]]\nwhere = "rod/xmax"\ndisplacement = ["0 mm", "8 mm", "0 mm"]\n'
     scene(text=text)
-    expect_ok(run("flexel-voxelize", part, "--count", "6000", "-o", "rest.vtu", "--quiet"))
+    expect_ok(run("flexel-voxelize", part, "--count", "1500", "-o", "rest.vtu", "--quiet"))
     expect_ok(run("flexel-simulate", "scene.toml", "rest.vtu", "-o", "bent.vtu", "--no-estimate", "--quiet"))
-    said = expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.step")).err
+    said = expect_ok(run("flexel-map", "bent.vtu", "-o", "bent.step", "--tolerance", "1e-3")).err
     expect("18 solids of 160 faces" in said and "valid, also" in said, said)
-    told = [expect_ok(run("flexel", "info", step)).out.decode() for step in (part, "bent.step")]
+    told = [info(step) for step in (part, "bent.step")]
     at_rest, names = (re.findall(r'^part "(.*)"', text, re.M) for text in told)
     expect(names == at_rest and len(at_rest) == 18, f"parts: {names}")
     tree_at_rest, tree = (text.split("parts in their assemblies\n")[1].split("\npart ")[0] for text in told)
@@ -392,42 +418,6 @@ def test_a_part_without_cad_faces_is_refused():
     for name in ("box.step", "box.igs", "box.brep"):
         expect_error(run("flexel-map", "body.vtu", "-o", name), "flexel-map", "has no CAD faces", "write a mesh")
     expect_only("body.vtu")
-
-
-def test_options_that_are_for_meshes_are_refused():
-    need_step()
-    bent()
-    map_step = ("flexel-map", "bent.vtu", "-o", "x.step")
-    expect_error(run(*map_step, "--crack", "cap"), "flexel-map", "--crack", "write a mesh")
-    expect_error(run(*map_step, "--attributes"), "flexel-map", "--attributes")
-    expect_error(run(*map_step, "--ascii"), "flexel-map", "--ascii")
-    expect_error(run(*map_step, "--unit", "inch"), "flexel-map", "--unit")
-    expect_error(run(*map_step, "--method", "gram-schmidt"), "flexel-map", "gram-schmidt", "blended")
-    expect_error(run(*map_step, "--onto", "bracket.step"), "flexel-map", "--onto")
-    for tolerance in ("0", "-1", "nan", "2", "3 kg", "soon"):
-        expect_error(run(*map_step, f"--tolerance={tolerance}"), "flexel-map")
-    expect_error(run("flexel-map", "bent.vtu", "-o", "x.stl", "--tolerance", "1e-4"), "flexel-map", "--tolerance")
-    expect(not list(pathlib.Path().glob("x.*")), "something was written")
-
-
-def test_a_missing_worker_is_one_line():
-    """flexel-cad is the one program that loads OpenCASCADE."""
-    bent()
-    os.mkdir("bin")
-    shutil.copy(BIN / "flexel-map", "bin/flexel-map")
-    shutil.copy(BIN / "flexel-voxelize", "bin/flexel-voxelize")
-    expect_error(run("./bin/flexel-map", "bent.vtu", "-o", "x.step"), "flexel-map", "flexel-cad", "install")
-    expect_error(run("./bin/flexel-voxelize", "bracket.step", "--size", "3mm", "-o", "x.vtu"), "flexel-voxelize", "flexel-cad")
-    expect_ok(run("./bin/flexel-map", "bent.vtu", "-o", "x.stl", "--quiet"))
-    os.mkdir("libexec"), os.mkdir("libexec/flexel")
-    os.symlink(BIN / "flexel-cad", "libexec/flexel/flexel-cad")
-    expect_ok(run("./bin/flexel-map", "bent.vtu", "-o", "x.step", "--quiet"))
-    os.remove("libexec/flexel/flexel-cad")
-    write("libexec/flexel/flexel-cad", "#!/bin/sh\nexit 127\n")
-    os.chmod("libexec/flexel/flexel-cad", 0o755)
-    expect_error(run("./bin/flexel-voxelize", "bracket.step", "--size", "3mm", "-o", "x.vtu"), "flexel-voxelize", "does not start", "install")
-    alone = run("flexel-cad", stdin=b"no job")
-    expect(alone.code == 127 and "run by the other programs" in alone.err, str(alone))
 
 
 if __name__ == "__main__":
