@@ -32,7 +32,8 @@ def find_ends(ids, own):
   place[ids[::-1]] = np.arange(len(ids))[::-1]
   a, b = place[bonds[:, 1]], place[bonds[:, 2]]
   here = ((a >= 0) & (a < own)) | ((b >= 0) & (b < own))
-  if (np.minimum(a, b)[here] < 0).any(): raise RuntimeError("a bond leads beyond the ghosts: raise comm_modify cutoff")
+  if (np.minimum(a, b)[here] < 0).any():
+    raise RuntimeError("a bond leads beyond the ghosts: raise comm_modify cutoff")
   return a[here], b[here], damping[bonds[here, 0] - 1]
 
 def forces(capsule):
@@ -51,7 +52,7 @@ def forces(capsule):
 )";
 
 constexpr const char* kFunctions = R"(
-def dashpots(capsule):
+def dashpots(capsule, virial):
   lmp, own, force = forces(capsule)
   array(lmp, b"f", own, ctypes.c_double, 3)[:] += force
 

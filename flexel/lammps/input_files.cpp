@@ -126,7 +126,7 @@ class Script {
     double rest = 0;
     for (const Spring& type : types_.types) rest = std::max(rest, type.length);
     const double skin = 0.1 * rest, reach = std::max(1.5 * rest + skin, 1.25 * particles_.longest);
-    line("units si\natom_style bond\nboundary s s s\nnewton on");
+    line("units si\natom_style bond\natom_modify sort 0 0.0\nboundary s s s\nnewton on");
     line("bond_style harmonic\nspecial_bonds lj/coul 1 1 1");
     line("neighbor {:.17g} bin\nneigh_modify every 1000000000 delay 1000000000 check no", skin);
     line("comm_modify cutoff {:.17g}{}", reach, particles_.damped() ? " vel yes" : "");
@@ -200,7 +200,7 @@ class Script {
     if (!particles_.half_kick) {
       for (std::size_t axis = 0; axis < 3; ++axis)
         line("variable kick{} atom v{}+{:.17g}*f{}/mass", kAxes[axis], kAxes[axis], 0.5 * step, kAxes[axis]);
-      line("velocity moving set v_kickx v_kicky v_kickz units box");
+      line("velocity all set v_kickx v_kicky v_kickz units box");
     }
     if (damped || !particles_.half_kick) still();
     if (damped) line("fix damping all python/invoke 1 post_force dashpots");
