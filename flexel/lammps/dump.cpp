@@ -135,7 +135,10 @@ void DumpReader::read_item(const std::string& name, DumpFrame& frame) {
 std::optional<DumpFrame> DumpReader::next() {
   std::string item;
   do {
-    if (!std::getline(file_, item)) return std::nullopt;
+    if (!std::getline(file_, item)) {
+      if (file_.bad()) throw InputError(path_, "cannot be read to its end");
+      return std::nullopt;
+    }
     ++line_;
   } while (words(item).empty());
   DumpFrame frame;

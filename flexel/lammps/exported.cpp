@@ -13,8 +13,7 @@
 #include "base/version.h"
 #include "flexel/lammps/input_files.h"
 #include "formats/lattice/body_file.h"
-#include "simulate/effects/loads.h"
-#include "simulate/effects/supports.h"
+#include "simulate/contact/pairs/stuck_places.h"
 #include "simulate/matter/stress.h"
 
 namespace flexel::lammps {
@@ -105,7 +104,8 @@ ExportNames export_names(const std::string& script) {
 
 std::string export_run(Body& body, const simulate::Scene& scene, const ExportNames& names,
                        std::vector<std::string> head, Progress& progress) {
-  simulate::erase_stress_columns(body);  // of an earlier run
+  simulate::erase_stress_columns(body);    // of an earlier run
+  body.notes.erase(simulate::kStuckNote);  // contact is refused
   const Particles particles = particles_of(body, scene, progress);
   const BondTypes types = bond_types(particles.springs);
   const std::vector<std::string> warnings = warnings_of(particles);
