@@ -88,6 +88,20 @@ void write_elements(const Particles& particles, DataText& text) {
   }
 }
 
+// Atom types tell what is held or led, and in a second half what loads act on.
+std::size_t support_types(const Particles& particles) {
+  return particles.supports.size() + 1;
+}
+
+bool loaded(const Particles& particles, std::size_t e) {
+  return std::any_of(particles.forces.begin(), particles.forces.end(),
+                     [&](const SteadyForce& each) { return each.force[e] != Vec3::Zero(); });
+}
+
+std::size_t type_of(const Particles& particles, std::size_t e) {
+  return 1 + particles.support[e] + (loaded(particles, e) ? support_types(particles) : 0);
+}
+
 // The factor of a course at time `t`, a variable: constant before the first time and after the last.
 std::string factor(const simulate::TimeCurve& course, const std::string& t) {
   if (course.time.empty()) return "1.0";
@@ -138,7 +152,8 @@ class Script {
     line("read_data \"{}\" fix element NULL Elements\nmass * 1.0  # not used: each atom has its own",
          names.data);
     if (!all.empty()) line("compute element all property/atom {}", fmt::join(all, " "));
-    for (std::size_t g = 0; g < particles_.supports.size(); ++g) line("group {} type {}", group(g), g + 2);
+    for (std::size_t g = 0; g < particles_.supports.size(); ++g)
+      line("group {} type {} {}", group(g), g + 2, g + 2 + support_types(particles_));
     std::string others;
     for (std::size_t g = 0; g < particles_.supports.size(); ++g)
       if (!by_velocity(g)) others += " " + group(g);
@@ -161,7 +176,8 @@ class Script {
         append_text(sum[axis], "{}v_load{}*c_element[{}]", f == 0 ? "" : "+", f + 1, 3 * f + axis + 1);
     }
     for (std::size_t axis = 0; axis < 3; ++axis) line("variable force{} atom {}", kAxes[axis], sum[axis]);
-    line("fix loads all addforce v_forcex v_forcey v_forcez");
+    line("group loaded type {}:{}", support_types(particles_) + 1, 2 * support_types(particles_));
+    line("fix loads loaded addforce v_forcex v_forcey v_forcez");
   }
 
   // Held axes of what moves along the others; after all that adds forces.
@@ -311,7 +327,7 @@ void write_data(const Particles& particles, const BondTypes& types, const std::s
                 const std::string& path) {
   DataText text(path);
   text.add("{}\n\n{} atoms\n{} atom types\n{} bonds\n{} bond types\n", head, particles.mass.size(),
-           particles.supports.size() + 1, particles.springs.size(), types.types.size());
+           2 * support_types(particles), particles.springs.size(), types.types.size());
   const Box box = bounding_box(particles.position);
   for (Eigen::Index axis = 0; axis < 3; ++axis)
     text.add("{:.17g} {:.17g} {}lo {}hi\n", box.min[axis] - particles.longest,
@@ -323,8 +339,8 @@ void write_data(const Particles& particles, const BondTypes& types, const std::s
   text.add("\nAtoms # bond\n\n");
   for (std::size_t e = 0; e < particles.position.size(); ++e) {
     const Vec3& x = particles.position[e];
-    text.add("{} {} {} {:.17g} {:.17g} {:.17g}\n", e + 1, particles.part[e] + 1, particles.support[e] + 1,
-             x.x(), x.y(), x.z());
+    text.add("{} {} {} {:.17g} {:.17g} {:.17g}\n", e + 1, particles.part[e] + 1, type_of(particles, e), x.x(),
+             x.y(), x.z());
   }
   text.add("\nVelocities\n\n");
   for (std::size_t e = 0; e < particles.velocity.size(); ++e) {
