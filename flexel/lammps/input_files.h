@@ -19,8 +19,8 @@ struct BondTypes {
 };
 [[nodiscard]] BondTypes bond_types(const std::vector<Spring>& springs);
 
-// Atom n + 1 is element n, its molecule 1 + the part, its type says which group of supports it is of, and whether
-// loads act on it. Throws InputError: the disk.
+// Atom n + 1 is element n, its molecule 1 + the part, its type says which group of supports it is of, and
+// whether loads act on it. Throws InputError: the disk.
 void write_data(const Particles& particles, const BondTypes& types, const std::string& head,
                 const std::string& path);
 
