@@ -39,13 +39,15 @@ void DumpReader::fail(const std::string& what) const {
   throw InputError(fmt::format("{}:{}", path_, line_), what);
 }
 
+void DumpReader::fail_cut(const char* at) const {
+  fail(fmt::format(
+      "the dump ends within a frame, at its {}: LAMMPS was stopped; remove line {} and those behind it", at,
+      begin_ + 1));
+}
+
 std::string DumpReader::line(const char* of) {
   std::string text;
-  if (!std::getline(file_, text) || file_.eof())  // LAMMPS ends every line
-    fail(fmt::format(
-        "the dump ends within a frame, at its {}: LAMMPS was stopped; remove the lines from the last "
-        "\"ITEM: TIMESTEP\" on",
-        of));
+  if (!std::getline(file_, text) || file_.eof()) fail_cut(of);  // LAMMPS ends every line
   ++line_;
   return text;
 }
@@ -77,6 +79,8 @@ void DumpReader::read_columns(const std::string& header) {
       fail(fmt::format("the dump has no column \"{}\": it needs id x y z, and vx vy vz for velocities",
                        kColumns[c]));
   }
+  const auto velocities = std::count_if(column_.begin() + 4, column_.end(), [](int c) { return c >= 0; });
+  if (velocities != 0 && velocities != 3) fail("of vx vy vz the dump needs all or none");
 }
 
 void DumpReader::read_atom(DumpFrame& frame, std::vector<bool>& seen) {
@@ -99,7 +103,7 @@ void DumpReader::read_atom(DumpFrame& frame, std::vector<bool>& seen) {
 
 void DumpReader::read_atoms(DumpFrame& frame) {
   frame.position.assign(elements_, Vec3::Zero());
-  if (column_[4] >= 0 && column_[5] >= 0 && column_[6] >= 0) frame.velocity.assign(elements_, Vec3::Zero());
+  if (column_[4] >= 0) frame.velocity.assign(elements_, Vec3::Zero());
   std::vector<bool> seen(elements_, false);
   for (std::size_t e = 0; e < elements_; ++e) {
     if (e % kBetweenChecks == 0) check_stop();
@@ -135,12 +139,14 @@ void DumpReader::read_item(const std::string& name, DumpFrame& frame) {
 std::optional<DumpFrame> DumpReader::next() {
   std::string item;
   do {
+    begin_ = line_;
     if (!std::getline(file_, item)) {
       if (file_.bad()) throw InputError(path_, "cannot be read to its end");
       return std::nullopt;
     }
     ++line_;
   } while (words(item).empty());
+  if (file_.eof()) fail_cut("header");
   DumpFrame frame;
   for (;; item = line("header")) {
     const std::string name = item.substr(0, item.find_last_not_of(" \t\r") + 1);
@@ -148,6 +154,12 @@ std::optional<DumpFrame> DumpReader::next() {
       read_item(name, frame);
       continue;
     }
+    if (last_ && frame.step <= *last_)
+      fail(fmt::format(
+          "step {} is not later than step {} of the frame before: the dump holds two runs, or its "
+          "frames are out of order",
+          frame.step, *last_));
+    last_ = frame.step;
     read_columns(name);
     read_atoms(frame);
     return frame;

@@ -25,11 +25,12 @@ class DumpReader {
   DumpReader(const std::string& path, std::size_t elements);
   // The next frame; nothing at the end. Throws InputError("FILE:LINE", ...): another number of atoms, an atom
   // twice or not at all, a column that is missing, a number that is none or not finite, a frame that ends
-  // early.
+  // early or is not later than the one before.
   [[nodiscard]] std::optional<DumpFrame> next();
 
  private:
   [[noreturn]] void fail(const std::string& what) const;
+  [[noreturn]] void fail_cut(const char* at) const;
   [[nodiscard]] std::string line(const char* of);
   [[nodiscard]] std::uint64_t whole(const std::string& text, const char* what) const;
   [[nodiscard]] double number(const std::string& text, const char* what) const;
@@ -39,7 +40,8 @@ class DumpReader {
   void read_atom(DumpFrame& frame, std::vector<bool>& seen);
 
   std::string path_;
-  std::size_t elements_, line_ = 0;
+  std::size_t elements_, line_ = 0, begin_ = 0;  // begin_: the line before the frame's first
+  std::optional<std::uint64_t> last_;            // the step of the frame before
   std::ifstream file_;
   // Places of id, x, y, z, vx, vy, vz in a line; -1: it is not there
   std::array<int, 7> column_{};

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <string_view>
 
 #include "base/error.h"
 #include "base/files/files.h"
@@ -91,13 +92,21 @@ std::string summary(const Particles& particles, const BondTypes& types, const Ex
   return json_text(json, 2) + "\n";
 }
 
+// LAMMPS puts ASCII for characters beyond it, and in a dump's name a number for % and *.
+bool lammps_takes(const std::string& name) {
+  return std::all_of(name.begin(), name.end(), [](char c) {
+    return c >= ' ' && c <= '~' && std::string_view("\"$&#%*").find(c) == std::string_view::npos;
+  });
+}
+
 }  // namespace
 
 ExportNames export_names(const std::string& script) {
   if (extension(script) != "in" || script.size() < 4)
     throw InputError(script, "LAMMPS's input script is a file OUT.in; OUT.data and OUT.vtu go beside it");
-  if (stem(script).find_first_of("\"$&#\n") != std::string::npos)
-    throw InputError(script, "LAMMPS takes no name with \", $, & or #: choose another");
+  if (!lammps_takes(stem(script)))
+    throw InputError(
+        script, "LAMMPS takes no name with \", $, &, #, %, * or characters beyond ASCII: choose another");
   const std::string base = script.substr(0, script.size() - 3);
   return {script, base + ".data", base + ".vtu", base + ".dump"};
 }

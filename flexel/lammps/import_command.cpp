@@ -14,6 +14,7 @@
 #include "base/program/termination.h"
 #include "flexel/lammps/dump.h"
 #include "flexel/lammps/imported.h"
+#include "formats/exchange/body_name.h"
 #include "formats/lattice/body_file.h"
 #include "simulate/matter/stress.h"
 #include "simulate/time/series.h"
@@ -59,6 +60,7 @@ int import_lammps_command(int argc, char** argv) {
   check_outputs({{arguments.output, true}}, {arguments.dump, arguments.body}, arguments.force);
   Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   progress.stage("read");
+  if (const std::string line = body_name_warning(arguments.output); !line.empty()) progress.warn(line);
   Body body = read_start(arguments.body);
   lammps::DumpReader dump(arguments.dump, body.element_count());
   std::optional<simulate::Series> series;
@@ -72,6 +74,9 @@ int import_lammps_command(int argc, char** argv) {
       progress.warn(
           fmt::format("{}: its first frame is of step {}, so whether it began as {} is cannot be told",
                       arguments.dump, frame->step, arguments.body));
+    if (frames == 0 && frame->velocity.empty())
+      progress.warn(fmt::format("{}: has no vx vy vz: a run that goes on from its bodies begins at rest",
+                                arguments.dump));
     if (series && (!frame->time || (time && !(*frame->time > *time))))
       throw InputError(arguments.dump, fmt::format("the frame of step {} {}", frame->step,
                                                    frame->time ? "is not later than the one before it"

@@ -122,6 +122,14 @@ double factor_at_start(const simulate::TimeCurve& course) {
   return course.at(start);
 }
 
+// Text in a comment: three quotes would join the lines behind to it, and LAMMPS warns of characters beyond
+// ASCII.
+std::string comment(const std::string& text) {
+  std::string shown;
+  for (const char c : printable(text)) shown += c == '"' || c < ' ' || c > '~' ? '?' : c;
+  return shown;
+}
+
 // Script that grows line by line.
 class Script {
  public:
@@ -357,7 +365,7 @@ void write_data(const Particles& particles, const BondTypes& types, const std::s
 std::string input_script(const Particles& particles, const BondTypes& types,
                          const std::vector<std::string>& head, const InputNames& names) {
   Script script(particles, types);
-  for (const std::string& each : head) script.line("# {}.", printable(each));
+  for (const std::string& each : head) script.line("# {}.", comment(each));
   script.line("");
   script.settings();
   script.reading(names);

@@ -1,4 +1,5 @@
 // What LAMMPS is given pulls as the models do, and what it gives back is read or refused line by line.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -195,9 +196,13 @@ TEST(Lammps, TurnsAreThoseOfTheMotion) {
   }
 }
 
-constexpr const char* kHead =
-    "ITEM: TIME\n0.5\nITEM: TIMESTEP\n10\nITEM: NUMBER OF ATOMS\n2\nITEM: BOX BOUNDS ss ss ss\n0 1\n0 1\n0 "
-    "1\n";
+std::string head_of(int step) {
+  return fmt::format(
+      "ITEM: TIME\n0.5\nITEM: TIMESTEP\n{}\nITEM: NUMBER OF ATOMS\n2\nITEM: BOX BOUNDS ss ss ss\n0 1\n0 1\n0 "
+      "1\n",
+      step);
+}
+const std::string kHead = head_of(10);
 constexpr const char* kAtoms = "ITEM: ATOMS id x y z vx vy vz\n";
 
 std::string read_with(const std::string& text) {
@@ -219,7 +224,7 @@ TEST(Lammps, ADumpGivesBackItsNumbersInTheOrderOfTheElements) {
   const std::string path = folder.path("run.dump");
   std::ofstream(path)
       << kHead << "ITEM: ATOMS vx id z y x vy vz\n1 2 0.30000000000000004 -1e-300 5 6 7\n8 1 9 10 11 12 13\n"
-      << kHead << "ITEM: ATOMS id x y z\n1 1 2 3\n2 4 5 6\n";
+      << head_of(20) << "ITEM: ATOMS id x y z\n1 1 2 3\n2 4 5 6\n";
   DumpReader reader(path, 2);
   const std::optional<DumpFrame> first = reader.next(), second = reader.next();
   ASSERT_TRUE(first && second);
@@ -233,14 +238,15 @@ TEST(Lammps, ADumpGivesBackItsNumbersInTheOrderOfTheElements) {
 }
 
 TEST(Lammps, WhatIsWrongWithADumpIsToldWithItsLine) {
-  const std::string good = std::string(kHead) + kAtoms + "1 1 2 3 4 5 6\n2 1 2 3 4 5 6\n";
+  const std::string good = kHead + kAtoms + "1 1 2 3 4 5 6\n2 1 2 3 4 5 6\n";
   EXPECT_EQ(read_with(good), "read");
-  EXPECT_EQ(read_with(good + good), "read");
+  const std::string later = head_of(20) + kAtoms + "1 1 2 3 4 5 6\n2 1 2 3 4 5 6\n";
+  EXPECT_EQ(read_with(good + later), "read");
   const auto refused = [](const std::string& text, const std::string& where, const std::string& what) {
     EXPECT_THAT(read_with(text), HasSubstr(where));
     EXPECT_THAT(read_with(text), HasSubstr(what));
   };
-  const std::string atoms = std::string(kHead) + kAtoms;
+  const std::string atoms = kHead + kAtoms;
   refused("solid box\n", "run.dump:1", "ITEM");
   refused(atoms + "1 1 2 3 4 5 6\n", "run.dump:12", "ends within a frame");
   refused(atoms + "1 1 2 3 4 5 6\n2 1 2 3 4 5 6", "run.dump",
@@ -250,8 +256,14 @@ TEST(Lammps, WhatIsWrongWithADumpIsToldWithItsLine) {
   refused(atoms + "1 1 2 nan 4 5 6\n", "run.dump:12", "shorter step");
   refused(atoms + "1 1 2 3x 4 5 6\n", "run.dump:12", "no number");
   refused(atoms + "1 1 2 3 4 5\n", "run.dump:12", "6 columns, not 7");
-  refused(std::string(kHead) + "ITEM: ATOMS id x y\n", "run.dump:11", "no column \"z\"");
+  refused(kHead + "ITEM: ATOMS id x y\n", "run.dump:11", "no column \"z\"");
   refused("ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n3\n", "run.dump:4", "3 atoms, but the body has 2");
+  refused(good + good, "run.dump:24", "step 10 is not later than step 10");
+  refused(later + good, "run.dump:24", "step 10 is not later than step 20");
+  refused(kHead + "ITEM: ATOMS id x y z vx vy\n", "run.dump:11", "all or none");
+  // What it says of a frame that is cut off leaves a dump that is read.
+  for (std::size_t cut = good.size() + 1; cut < good.size() + later.size(); ++cut)
+    refused((good + later).substr(0, cut), "run.dump", "remove line 14 and those behind it");
   refused("ITEM: UNITS\nlj\n", "run.dump:2", "units lj");
   refused("ITEM: TIMESTEP\n-1\n", "run.dump:2", "whole number");
 }

@@ -172,6 +172,23 @@ def test_from_the_part_itself():
     expect_ok(run("flexel", "import-lammps", "a run.dump", "a run.vtu", "-o", "end.vtu"))
 
 
+def test_names_that_lammps_reads_otherwise():
+    """What a file's name holds does not become a command, and a name that LAMMPS would change is refused."""
+    lattice()
+    text = scene("scene.toml", ALL.replace("MODEL", "springs").replace("METHOD", "symplectic").replace('60 ms"\nstep = "60 us', '0.3 ms"\nstep = "30 us') + DAMPING)
+    for name in ("a%d", "a*b", "b\u00fc", "a\u00a0b", "a\u201cb", "a\u2212b", "a&", "a$b", 'a"b', "a#b", "a\rb"):
+        expect_error(run("flexel", "export", "rest.vtu", "--scene", text, "--lammps", "-o", f"{name}.in"), "flexel", "LAMMPS takes no name")
+    for name in ('p"""q', "p &", "$(shell touch written)", "\u201d\u00fc"):
+        os.rename("scene.toml", f"{name}.toml")
+        expect_ok(run("flexel", "export", "rest.vtu", "--scene", f"{name}.toml", "--lammps", "-o", "it's {a} \\n.in", "--force"))
+        os.rename(f"{name}.toml", "scene.toml")
+        need("lmp")
+        said = run_lammps("it's {a} \\n.in")
+        expect("ASCII" not in said and not os.path.exists("written"), said)
+        expect_ok(run("flexel", "import-lammps", "it's {a} \\n.dump", "it's {a} \\n.vtu", "-o", "end.vtu"))
+        os.remove("it's {a} \\n.dump")
+
+
 REFUSED = [
     ('[run]\n', "[contact]\nself = true\n[run]\n", "contact"), ('[run]\n', '[drag]\nmedium = "water"\n[run]\n', "drag"),
     ('[run]\n', '[plasticity]\nyield = "1 MPa"\n[run]\n', "plasticity"), ('[run]\n', '[fracture]\nstrength = "1 MPa"\n[run]\n', "fracture"),
@@ -245,6 +262,8 @@ def test_dumps_of_another_run_are_refused():
     expect_error(run("flexel", "import-lammps", "missing.dump", "rest.vtu", "-o", "other.vtu"), "flexel", "missing.dump")
     expect_error(run("flexel", "import-lammps", "rest.vtu", "rest.vtu", "-o", "other.vtu"), "flexel", "rest.vtu")
     expect(not os.path.exists("other.vtu"), "a file is left")
+    expect_error(ask(good + good, "other.vtu"), "flexel", "run.dump", "not later")
+    expect("at rest" in ask(good, "out.vtu").err and "whatever its name" in ask(good, "out.stl").err, "no warning")
     late = ask(good.replace("TIMESTEP\n0", "TIMESTEP\n5"), "late.vtu")
     expect(late.code == 0 and "step 5" in late.err, f"{late}")
     folded = ask(good + DUMP.format(7, count) + lines(positions * [-1, 1, 1]), "folded.vtu")
