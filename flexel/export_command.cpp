@@ -19,7 +19,9 @@
 #include "flexel/export/tet_mesh.h"
 #include "flexel/export/translate.h"
 #include "flexel/job.h"
+#include "flexel/lammps/exported.h"
 #include "flexel/measure/coordinates.h"
+#include "formats/lattice/body_file.h"
 #include "simulate/matter/fragments.h"
 #include "voxelize/report.h"
 #include "voxelize/voxelize.h"
@@ -33,15 +35,21 @@ constexpr std::size_t kLookCells = 3000;
 struct ExportArguments {
   JobArguments job;
   std::string output, mesh = "hex", element = "C3D8I", nlgeom = "auto", summary;
-  bool calculix = false, quiet = false, json = false;
+  bool calculix = false, lammps = false, quiet = false, json = false;
   int threads = 0;
 };
 
 void declare(CommandLine& app, ExportArguments& arguments) {
   declare_job(app, arguments.job);
-  app.add_flag("--calculix", arguments.calculix, "For CalculiX (ccx), as an .inp file (docs/guide/export.md)")
-      .required();
+  app.add_flag("--calculix", arguments.calculix,
+               "For CalculiX (ccx), as an .inp file (docs/guide/export.md)");
+  app.add_flag("--lammps", arguments.lammps,
+               "A timed run of models springs and paper for LAMMPS (lmp), as OUT.in, OUT.data and OUT.vtu");
   app.add_option("-o,--output", arguments.output, "The file; -: stdout").type_name("FILE").required();
+  app.add_option("--placement", arguments.job.placement,
+                 "With --lammps: elements at the voxels' corner or centre (model \"paper\")")
+      .type_name("WHERE")
+      .show_default();
   app.add_option("--mesh", arguments.mesh,
                  "hex: the lattice's cells; tet: second-order tetrahedra, by the program gmsh")
       .type_name("KIND")
@@ -63,6 +71,18 @@ void choose(const char* option, const std::string& word, const std::vector<std::
   if (std::find(known.begin(), known.end(), word) == known.end())
     throw InputError(fmt::format("{}: no \"{}\"{}; choose {}", option, word, did_you_mean(word, known),
                                  fmt::join(known, ", ")));
+}
+
+// Throws InputError: neither target or both, an option of the other.
+void check_target(const ExportArguments& arguments, const CommandLine& app) {
+  if (arguments.calculix == arguments.lammps)
+    throw InputError(arguments.lammps ? "give --calculix or --lammps, not both"
+                                      : "for which program? add --calculix or --lammps");
+  for (const char* option : {"--mesh", "--element", "--nlgeom"})
+    if (arguments.lammps && app.has(option))
+      throw InputError(fmt::format("{} is for --calculix: LAMMPS gets the elements themselves", option));
+  if (arguments.calculix && app.has("--placement"))
+    throw InputError("--placement is for --lammps: CalculiX gets cells");
 }
 
 void check(const ExportArguments& arguments) {
@@ -246,6 +266,67 @@ mesh_export::Analysis analyse(const ExportArguments& arguments, Job& job, const 
   return analysis;
 }
 
+// The outputs of --lammps, checked.
+lammps::ExportNames lammps_names(const ExportArguments& arguments) {
+  lammps::ExportNames names = lammps::export_names(arguments.output);
+  std::vector<std::string> inputs = arguments.job.parts;
+  inputs.push_back(arguments.job.scene);
+  check_outputs(
+      {{names.script}, {names.data}, {names.body}, {arguments.summary}, {arguments.json ? "-" : ""}}, inputs,
+      arguments.job.force);
+  return names;
+}
+
+bool is_body(const JobArguments& arguments) {
+  return arguments.parts.size() == 1 && extension(arguments.parts.front()) == "vtu";
+}
+
+// A body goes as it is, in its state; options that make one have no say.
+Body body_for_lammps(const JobArguments& arguments, Job& job, const CommandLine& app, Progress& progress) {
+  if (is_body(arguments)) {
+    for (const char* option : {"--size", "--count", "--heal", "--unit", "--edge", "--placement"})
+      if (app.has(option))
+        throw InputError(
+            fmt::format("{} is for parts: {} is a body already", option, arguments.parts.front()));
+    return read_body(arguments.parts.front());
+  }
+  const Surface surface = read_parts(arguments.parts, job.import, progress);
+  check_parts(job, surface);
+  voxelize::VoxelizeResult voxels = voxelize::voxelize(surface, job.voxelize, progress);
+  voxelize::report(voxels, progress);
+  return std::move(voxels.body);
+}
+
+int export_to_lammps(const ExportArguments& arguments, const CommandLine& app) {
+  Job job;
+  lammps::ExportNames names;
+  const auto plan = [&] {
+    names = lammps_names(arguments);
+    job = plan_job(arguments.job);
+  };
+  if (is_body(arguments.job))
+    plan();
+  else
+    plan_after_files(arguments.job, plan);
+  const ThreadLimit limit(arguments.threads);
+  Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
+  progress.stage("import");
+  Body body = body_for_lammps(arguments.job, job, app, progress);
+  add_actions(job, body);
+  progress.stage("translate");
+  OutputsTogether outputs({names.script, names.data, names.body, arguments.summary});
+  const std::string summary = lammps::export_run(
+      body, job.scene, names,
+      {fmt::format("LAMMPS input by flexel {}: {}{}", version(), fmt::join(arguments.job.parts, ", "),
+                   arguments.job.scene.empty() ? "" : ", scene " + arguments.job.scene)},
+      progress);
+  progress.finish();
+  if (!arguments.summary.empty()) write_text(summary, arguments.summary);
+  outputs.appear();
+  if (arguments.json) write_text(summary, "-");
+  return kExitDone;
+}
+
 }  // namespace
 
 int export_command(int argc, char** argv) {
@@ -255,6 +336,8 @@ int export_command(int argc, char** argv) {
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const StopEndsProcess nothing_is_left;
+  check_target(arguments, app);
+  if (arguments.lammps) return export_to_lammps(arguments, app);
   Job job;
   plan_after_files(arguments.job, [&] {
     check(arguments);

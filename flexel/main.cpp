@@ -15,6 +15,7 @@
 #include "base/program/program.h"
 #include "base/version.h"
 #include "flexel/commands.h"
+#include "flexel/lammps/import_command.h"
 #include "formats/common/file_formats.h"
 
 namespace flexel::commands {
@@ -35,6 +36,10 @@ constexpr const char* kHelp =
     "                        which is stiffer: mass, displacement, stiffness and stress in one table\n"
     "  flexel export PART... --scene FILE --calculix -o OUT.inp\n"
     "                        mesh, sets, material, supports and loads for detailed analysis by CalculiX\n"
+    "  flexel export PART... --scene FILE --lammps -o OUT.in\n"
+    "                        elements as atoms and springs as bonds, for a timed run by LAMMPS\n"
+    "  flexel import-lammps DUMP BODY -o OUT\n"
+    "                        what LAMMPS made of it, as a body (.vtu) or a series (.pvd)\n"
     "  flexel info PART...   solids, faces, unit, size, volume, closedness, thinnest wall: what a scene can "
     "name\n"
     "  flexel picture FILE... -o OUT.png\n"
@@ -75,6 +80,7 @@ constexpr Command kCommands[] = {{"deform", deform_command},
                                  {"compare", compare_command},
                                  {"compensate", compensate_command},
                                  {"export", export_command},
+                                 {"import-lammps", import_lammps_command},
                                  {"flex", flex_command},
                                  {"info", info_command},
                                  {"picture", picture_command},

@@ -7,7 +7,7 @@ import pathlib
 import shutil
 import sys
 
-from harness import BIN, SCENE, Skip, body, box, bracket, expect, expect_ok, main, need_step, run, scene, write
+from harness import BIN, SCENE, SOURCE, Skip, body, box, bracket, expect, expect_ok, main, need_step, run, scene, write
 
 # FLEXEL_FAULTS_MOST: how many of each kind of call fail, evenly between the first and the last (FLEXEL_FAULTS_ALLOCATIONS: of
 # allocations); FLEXEL_FAULTS_RESULTS: a file to
@@ -158,6 +158,25 @@ def test_export():
     box()
     scene()
     sweep(("flexel", "export", "box.stl", "--scene", "scene.toml", "--size", "5 mm", "--calculix", "-o", "out.inp"), ("out.inp",))
+
+
+SWING = 'model = "springs"\n' + SCENE.replace("-100 N", "-1 N") + '[run]\ntime = "20 us"\nstep = "0.2 us"\n'
+
+
+def test_export_to_lammps():
+    box()
+    scene("scene.toml", SWING)
+    sweep(("flexel", "export", "box.stl", "--scene", "scene.toml", "--size", "5 mm", "--lammps", "-o", "out.in"), ("out.in", "out.data", "out.vtu"))
+
+
+def test_import_lammps():
+    body()
+    sys.path.insert(0, str(SOURCE / "tests/interop"))
+    from files import vtu_arrays
+    positions = vtu_arrays("body.vtu")["points/position"].tolist()
+    frame = f"ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n{len(positions)}\nITEM: BOX BOUNDS ss ss ss\n0 1\n0 1\n0 1\nITEM: ATOMS id x y z\n"
+    write("run.dump", frame + "".join(f"{n} {x!r} {y!r} {z!r}\n" for n, (x, y, z) in enumerate(positions, 1)))
+    sweep(("flexel", "import-lammps", "run.dump", "body.vtu", "-o", "out.vtu"), ("out.vtu",))
 
 
 def test_info_on_stdout():

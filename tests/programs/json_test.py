@@ -88,7 +88,7 @@ def test_scene_keys():
 
 
 # What draws, serves, only lists where to click, or makes a body of a body has nothing to print as JSON.
-WITHOUT = {"picture", "view", "clay", "coarsen"}
+WITHOUT = {"picture", "view", "clay", "coarsen", "import-lammps"}
 
 
 def test_every_command_has_it_or_prints_nothing():

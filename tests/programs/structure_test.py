@@ -23,7 +23,7 @@ simulate/kernels simulate/matter simulate/gravitation simulate/contact/points si
 simulate/equilibrium simulate/estimate simulate/probes simulate/quadratic/cells simulate/quadratic simulate/conduction simulate/live simulate/stepping simulate/implicit simulate/time simulate/modes simulate
 mapping/types mapping/anchors mapping/checks mapping/methods mapping/space mapping/crack mapping/report mapping/refine mapping
 cad/read cad/fit cad/deform cad
-flexel/process flexel/picture/canvas flexel/picture/render flexel/picture flexel/view flexel/clay flexel/study/runs flexel/study flexel/export
+flexel/process flexel/picture/canvas flexel/picture/render flexel/picture flexel/view flexel/clay flexel/study/runs flexel/study flexel/export flexel/lammps
 flexel/measure flexel/accuracy flexel/compensate flexel/flex flexel
 python
 """.split()
