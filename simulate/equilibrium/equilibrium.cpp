@@ -1,8 +1,8 @@
 // The whole load is tried at once (or in the steps that the scene asks for), with full Newton steps. A load
 // step that fails is halved and tried again from the last equilibrium; from a thirty-second on it is tried
-// with steps that lower the energy too, which also pass a buckling or a snap. An easy one lets the next be twice
-// as long, later each time that this fails (load_step_length.h). The Newton iterations of a run are bounded: a scene without an equilibrium ends in the
-// time of some hundred linear solutions.
+// with steps that lower the energy too, which also pass a buckling or a snap. An easy one lets the next be
+// twice as long, later each time that this was in vain (load_step_length.h). The Newton iterations of a run are
+// bounded: a scene without an equilibrium ends in the time of some hundred linear solutions.
 //
 // A rotation is followed along its arc, a quarter of a turn a load step at most: further on the straight way
 // to its end is none, and a whole turn would end where it began. Where the load steps shrink to nothing
