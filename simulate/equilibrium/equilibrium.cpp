@@ -131,6 +131,7 @@ class LoadStepping {
   int spent_near_ = 0;             // iterations of an attempt from there that came to nothing
   bool pushed_ = false;            // the next attempt starts beside the last equilibrium
   int pushes_ = 0;
+  double least_residual_ = 1;  // relative, of the attempts since the last equilibrium
 };
 
 int LoadStepping::iterations_left() const {
@@ -194,6 +195,7 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   result_.newton_iterations += outcome_.iterations;
   result_.cg_iterations += outcome_.cg_iterations;
   result_.linear_seconds += outcome_.linear_seconds;
+  least_residual_ = outcome_.converged ? 1 : std::min(least_residual_, outcome_.relative_residual);
   if (!outcome_.converged) return false;
   done_ = trial_.share;
   state_ = trial_;
@@ -262,7 +264,7 @@ void LoadStepping::push(State& state) const {
 }
 
 bool LoadStepping::branch_off() {
-  if (!(done_ > 0) || overloaded() || mechanics_.follows() || outcome_.relative_residual > kBalanced ||
+  if (!(done_ > 0) || overloaded() || mechanics_.follows() || least_residual_ > kBalanced ||
       pushes_ == kMostPushes)
     return false;
   ++pushes_;
