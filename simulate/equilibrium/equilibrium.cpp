@@ -1,8 +1,8 @@
 // The whole load is tried at once (or in the steps that the scene asks for), with full Newton steps. A load
 // step that fails is halved and tried again from the last equilibrium; from a thirty-second on it is tried
-// with steps that lower the energy too, which also pass a buckling or a snap. One that succeeds lets the next
-// be twice as long. The Newton iterations of a run are bounded: a scene without an equilibrium ends in the
-// time of some hundred linear solutions.
+// with steps that lower the energy too, which also pass a buckling or a snap. An easy one lets the next be
+// twice as long, later each time that this was in vain (load_step_length.h). The Newton iterations of a run are
+// bounded: a scene without an equilibrium ends in the time of some hundred linear solutions.
 //
 // A rotation is followed along its arc, a quarter of a turn a load step at most: further on the straight way
 // to its end is none, and a whole turn would end where it began. Where the load steps shrink to nothing
@@ -25,6 +25,7 @@
 #include "base/program/share_scope.h"
 #include "base/stop.h"
 #include "base/units.h"
+#include "simulate/equilibrium/load_step_length.h"
 #include "simulate/equilibrium/rigid_link_equilibrium.h"
 #include "simulate/input/scene_words.h"
 #include "simulate/models/rest_shape.h"
@@ -84,8 +85,7 @@ class LoadStepping {
         progress_(progress),
         start_(start),
         first_(1.0 / std::max(settings.load_steps, least_load_steps(mechanics.constraints()))),
-        longest_(first_),
-        increment_(first_) {}
+        length_(first_) {}
 
   EquilibriumResult operator()();
 
@@ -94,7 +94,7 @@ class LoadStepping {
   // Tries the next share; true and moved on when it converged.
   bool attempt(NewtonSteps steps, int max_iterations);
   [[nodiscard]] bool gives_up() const {
-    return increment_ <= kSmallestIncrement * first_ || iterations_left() <= 0;
+    return length_.get() <= kSmallestIncrement * first_ || iterations_left() <= 0;
   }
   // After an attempt: where its linear answer reached too far, tries the whole load from what `start_` gives.
   // True where the whole load is still to be tried, or done.
@@ -117,8 +117,9 @@ class LoadStepping {
   const RunSettings& settings_;
   Progress& progress_;
   const CoarseStart& start_;
-  double first_, longest_;  // share of the load: the first step; none is longer
-  double increment_, done_ = 0;
+  double first_;  // share of the load: the first step; none is longer
+  LoadStepLength length_;
+  double done_ = 0;                  // share of the load
   double begun_ = kBeforeFirstStep;  // share of the run's time that its start takes
   EquilibriumResult result_;
   State trial_;  // of the last attempt
@@ -130,6 +131,7 @@ class LoadStepping {
   int spent_near_ = 0;             // iterations of an attempt from there that came to nothing
   bool pushed_ = false;            // the next attempt starts beside the last equilibrium
   int pushes_ = 0;
+  double least_residual_ = 1;  // relative, of the attempts since the last equilibrium
 };
 
 int LoadStepping::iterations_left() const {
@@ -169,14 +171,15 @@ void LoadStepping::refuse_load() const {
 }
 
 bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
+  const double next = done_ + length_.get() > 1 - 1e-9 ? 1 : done_ + length_.get();
   NewtonOptions options;
   options.steps = steps;
   options.tolerance = settings_.tolerance;
   options.max_iterations = std::min(max_iterations, iterations_left());
-  options.farthest_reach = std::min(farthest_reach_, hopeless_reach_ * (done_ + increment_));
+  options.farthest_reach = std::min(farthest_reach_, hopeless_reach_ * next);
   trial_ = state_;
   if (near_) trial_.displacement = near_->displacement;
-  trial_.share = done_ + increment_ > 1 - 1e-9 ? 1 : done_ + increment_;
+  trial_.share = next;
   if (pushed_) push(trial_);
   std::optional<ShareScope> preparing;
   if (reach_ == 0) preparing.emplace(progress_, kBeforeSearch, kBeforeFirstStep, "preparing");
@@ -192,6 +195,7 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   result_.newton_iterations += outcome_.iterations;
   result_.cg_iterations += outcome_.cg_iterations;
   result_.linear_seconds += outcome_.linear_seconds;
+  least_residual_ = outcome_.converged ? 1 : std::min(least_residual_, outcome_.relative_residual);
   if (!outcome_.converged) return false;
   done_ = trial_.share;
   state_ = trial_;
@@ -199,7 +203,7 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   for (const ActiveEffect& effect : mechanics_.effects()) effect->accept(state_);
   ++result_.load_steps;
   result_.relative_residual = outcome_.relative_residual;
-  if (outcome_.iterations <= kEasyIterations) increment_ = std::min(longest_, 2 * increment_);
+  length_.succeeded(outcome_.iterations <= kEasyIterations);
   return true;
 }
 
@@ -260,13 +264,13 @@ void LoadStepping::push(State& state) const {
 }
 
 bool LoadStepping::branch_off() {
-  if (!(done_ > 0) || overloaded() || mechanics_.follows() || outcome_.relative_residual > kBalanced ||
+  if (!(done_ > 0) || overloaded() || mechanics_.follows() || least_residual_ > kBalanced ||
       pushes_ == kMostPushes)
     return false;
   ++pushes_;
   result_.buckled = true;
   const double from = done_;
-  increment_ = kPushedIncrement * first_;
+  length_.set(kPushedIncrement * first_);
   pushed_ = true;
   const bool left = attempt(NewtonSteps::lowering, kPushedIterations);
   pushed_ = false;
@@ -317,13 +321,13 @@ void LoadStepping::solve() {
     if (reach_ > hopeless_reach_) refuse_load();
     hopeless_reach_ = std::numeric_limits<double>::infinity();  // the first answer alone counts
     if (begin_near()) continue;
-    if (iterations_left() > 0 && increment_ <= kLoweringIncrement * first_ && !mechanics_.follows() &&
+    if (iterations_left() > 0 && length_.get() <= kLoweringIncrement * first_ && !mechanics_.follows() &&
         attempt(NewtonSteps::lowering, NewtonOptions().max_iterations))
       continue;
     if (!gives_up()) {
-      increment_ /= 2;
+      length_.failed(trial_.share - done_);
       // a part that rolls up turns as far with each step of the load
-      if (mechanics_.follows()) longest_ = increment_;
+      if (mechanics_.follows()) length_.stop_growing();
     } else if (!branch_off()) {
       diverge();
     }
