@@ -23,6 +23,7 @@
 #include "flexel/commands.h"
 #include "flexel/job.h"
 #include "formats/part/topology.h"
+#include "simulate/indent/indenters.h"
 #include "simulate/result/options.h"
 #include "simulate/result/result.h"
 #include "simulate/scene/strength.h"
@@ -65,9 +66,10 @@ std::optional<simulate::ErrorBar> error_bar_of(const simulate::SimulateResult& r
 
 // Of the loads, else what the moves take.
 double resultant(const simulate::SimulateResult& result, const simulate::Scene& scene, bool& driven) {
+  driven = false;
+  if (!scene.get<simulate::Indenters>().indenters.empty()) return 0;  // contact is in proportion to nothing
   Vec3 sum = Vec3::Zero();
   for (const simulate::AppliedLoad& load : result.loads) sum += load.force;
-  driven = false;
   bool turned = false;
   for (const simulate::Tie& tie : scene.get<simulate::Supports>().ties) {
     driven = driven || tie.is_move;

@@ -37,6 +37,7 @@
 #include "mapping/output.h"
 #include "mapping/report/report.h"
 #include "simulate/answer.h"
+#include "simulate/indent/indenters.h"
 #include "simulate/input/infill.h"
 #include "simulate/matter/voxel_pieces.h"
 #include "simulate/quadratic/quadratic_run.h"
@@ -589,6 +590,7 @@ SolvedRun solve_to_goal(const DeformArguments& arguments, Plan& plan, const Surf
                         AccuracyReport& accuracy, Progress& progress) {
   for (const simulate::Tie& tie : plan.job.scene.get<simulate::Supports>().ties)
     plan.goal->driven |= tie.is_move;
+  plan.goal->driven |= !plan.job.scene.get<simulate::Indenters>().indenters.empty();
   plan.goal->driven |= !plan.job.moves.empty() || !plan.job.twists.empty() || plan.job.flex;
   GoalRuns runs(arguments, plan, surface, progress);
   SolvedRun run = choose_resolution(*plan.goal, std::ref(runs), accuracy, progress);

@@ -74,6 +74,21 @@ Act grab_act(const std::string& rest, const std::string& place) {
   return act;
 }
 
+// "ball X Y Z NX NY NZ RADIUS", or "plate ..."
+Act push_act(const std::string& rest, const std::string& place) {
+  const std::vector<std::string> words = words_of(rest);
+  if (words.size() != 8 || (words[0] != "ball" && words[0] != "plate"))
+    throw InputError(place, "push: give \"ball X Y Z NX NY NZ RADIUS\" or \"plate X Y Z NX NY NZ RADIUS\"");
+  Act act{Act::Kind::push, words[0], {}};
+  act.at = vector(words, 1, kFarthest, place);
+  act.from = vector(words, 4, kFarthest, place);
+  if (!(act.from.norm() > 1e-6)) throw InputError(place, "push: NX NY NZ is no direction");
+  act.from.normalize();
+  act.radius = number(words[7], kFarthest, place);
+  if (!(act.radius > 0)) throw InputError(place, "a tool has a radius above 0");
+  return act;
+}
+
 // "at X Y Z RADIUS", and for glue how near.
 Act ball_act(Act::Kind kind, const std::string& rest, const std::string& place) {
   const bool glues = kind == Act::Kind::glue;
@@ -120,6 +135,7 @@ Act parse_act(const std::string& line, const std::string& place) {
     return act;
   }
   if (word == "grab") return grab_act(rest, place);
+  if (word == "push") return push_act(rest, place);
   if (word == "carve") return ball_act(Act::Kind::carve, rest, place);
   if (word == "glue") return ball_act(Act::Kind::glue, rest, place);
   if (word == "hand") return hand_act(rest, place);

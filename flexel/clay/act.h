@@ -14,6 +14,7 @@ struct Act {
     hand,     // the hand is there, and a spring draws the tool after it
     hold,     // a face is held, or let go
     grab,     // a tool takes a face, or what rests in a ball
+    push,     // a tool that only pushes is put down: a ball or a plate
     stay,     // the hand leaves, the tool stays where it is
     release,  // the last tool lets go
     keep,     // the present shape becomes the rest shape
@@ -26,13 +27,14 @@ struct Act {
     take    // the tool, from another hand
   };
   Kind kind = Kind::pose;
-  std::string name;           // of a face, a material or a part
-  ToolPose pose = {};         // pose, hand
-  Vec3 at = Vec3::Zero();     // m, rest: carve, glue, and grab, where `name` is ""
-  double radius = 0;          // m, likewise
-  bool on = true;             // hold
-  double within = 0;          // m, glue: how near
+  std::string name;        // of a face, a material or a part; push: "ball" or "plate"
+  ToolPose pose = {};      // pose, hand
+  Vec3 at = Vec3::Zero();  // m, rest: carve, glue, and grab, where `name` is ""; now: push, where it touches
+  double radius = 0;       // m, likewise
+  bool on = true;          // hold
+  double within = 0;       // m, glue: how near
   std::string material = {};  // paint
+  Vec3 from = Vec3::Zero();   // push: unit vector, from the part to where the tool comes from
 };
 
 // What one message says.

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "base/error.h"
@@ -17,8 +18,9 @@ std::string lengths(const Vec3& v) {
 }
 
 std::string move_of(const ClayTool& tool, std::size_t number) {
-  std::string text = fmt::format("\n[[move]]\nname = \"tool {}\"\nwhere = {}\ndisplacement = {}\n", number,
-                                 tool.where, lengths(tool.pose.displacement));
+  std::string text =
+      fmt::format("\n[[{}]]\nname = \"tool {}\"\n{}{}\ndisplacement = {}\n", tool.shape ? "indenter" : "move",
+                  number, tool.shape ? "" : "where = ", tool.where, lengths(tool.pose.displacement));
   const double angle = tool.pose.turn.norm();
   if (angle > 0) {
     const Vec3 axis = tool.pose.turn / angle;
@@ -66,6 +68,20 @@ std::string where_of_name(const std::string& name) {
   return text + '"';
 }
 
+std::string shape_text(const simulate::IndenterShape& shape, const simulate::IndenterPlace& place) {
+  const Vec3& n = place.normal;
+  const std::string normal = fmt::format(", normal = [{:.17g}, {:.17g}, {:.17g}]", n.x(), n.y(), n.z());
+  return fmt::format("{} = {{ centre = {}{}, radius = \"{:.17g} m\" }}", shape.plate ? "plate" : "ball",
+                     lengths(place.centre), shape.plate ? normal : "", shape.radius);
+}
+
+int ClayTool::steps(const ToolPose& way) const {
+  if (!shape) return 1;
+  const double length = way.displacement.norm() + radius * way.turn.norm();
+  return std::max(1,
+                  static_cast<int>(std::ceil(length / (simulate::kIndenterStep * shape->rounding) - 1e-9)));
+}
+
 std::string where_of_ball(const Vec3& centre, double radius) {
   return fmt::format("{{ sphere = {{ centre = {}, radius = \"{:.17g} m\" }} }}", lengths(centre), radius);
 }
@@ -101,6 +117,9 @@ void refuse_unkept(const std::string& base, const std::string& name) {
   Act carve{Act::Kind::carve, "", {}};
   carve.radius = 1;
   document.changes = {change_text(carve)};
+  ClayTool& pusher = document.tools.emplace_back();
+  pusher.shape = {false, 1, 1};
+  pusher.where = shape_text(*pusher.shape, {});
   document.painted["a part that hands paint"] = "PLA";
   std::string why = "\"renormalise\" is nowhere in its [run]";
   try {
@@ -109,7 +128,7 @@ void refuse_unkept(const std::string& base, const std::string& name) {
     why = fmt::format("{}: {}", error.where(), error.what());
   }
   throw InputError(name, fmt::format("what hands do cannot be added to it ({}): write [run], [[fix]], "
-                                     "[[move]] and [parts.NAME] as tables of "
+                                     "[[move]], [[indenter]] and [parts.NAME] as tables of "
                                      "their own",
                                      why));
 }

@@ -2,20 +2,27 @@
 #pragma once
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "flexel/clay/act.h"
 #include "formats/lattice/body.h"
+#include "simulate/indent/indenter_shape.h"
 
 namespace flexel::clay {
 
 struct ClayTool {
-  std::string where;           // TOML, of the scene
+  std::string where;           // TOML, of the scene: what it takes; of one that pushes its shape
   Vec3 centre = Vec3::Zero();  // m, rest, of a ball
-  double radius = 0;           // m, likewise; 0: a face
-  Vec3 middle = Vec3::Zero();  // m, rest
+  double radius = 0;           // m, likewise, or of one that pushes; 0: a face
+  Vec3 middle = Vec3::Zero();  // m, rest; of one that pushes its own, clear of the part
   ToolPose pose;
+  std::optional<simulate::IndenterShape> shape = {};  // of one that pushes
+  Vec3 normal = Vec3::Zero();                         // rest, that its face looks along
+
+  // Steps that go no further than the tool may in one.
+  [[nodiscard]] int steps(const ToolPose& way) const;
 };
 
 struct NumberedBody {
@@ -51,6 +58,9 @@ void forget_oldest(std::vector<ClayDocument>& undo, std::size_t most, std::size_
 // TOML of a name; of a ball.
 [[nodiscard]] std::string where_of_name(const std::string& name);
 [[nodiscard]] std::string where_of_ball(const Vec3& centre, double radius);
+// TOML of the shape of an [[indenter]].
+[[nodiscard]] std::string shape_text(const simulate::IndenterShape& shape,
+                                     const simulate::IndenterPlace& place);
 // The [[event]] of an act that carves or glues.
 [[nodiscard]] std::string change_text(const Act& act);
 

@@ -72,6 +72,13 @@ Json numbers(const Vec3& a, const Vec3& b) {
   return {a.x(), a.y(), a.z(), b.x(), b.y(), b.z()};
 }
 
+Json shape_of(const ClayTool& tool) {
+  if (!tool.shape) return nullptr;
+  return {{"kind", tool.shape->plate ? "plate" : "ball"},
+          {"radius", tool.radius},
+          {"normal", {tool.normal.x(), tool.normal.y(), tool.normal.z()}}};
+}
+
 // (points x 3) as frames have them.
 std::string single_precision(const std::vector<Vec3>& points) {
   std::vector<float> numbers;
@@ -114,13 +121,17 @@ std::string header_of(const Body& body) {
     parts.push_back({{"name", printable(body.parts[p].name)}, {"begin", begin}, {"end", end}});
   }
   const Json header = {{"flexel-live", 1},
-                       {"clay", 2},
+                       {"clay", 3},
                        {"rate", 0},
                        {"state_every", 1},
                        {"elements", body.element_count()},
                        {"parts", parts},
                        {"tools", Json::array()}};
   return json_text(header) + "\n";
+}
+
+void refuse_more_tools(const ClayDocument& document) {
+  if (document.tools.size() == kMostTools) throw InputError("16 tools are there: let one go first");
 }
 
 bool is_motion(const Act& act) {
@@ -249,13 +260,11 @@ void ClaySession::run() {
 void ClaySession::perform(const Act& act) {
   if (act.kind == Act::Kind::take) return;
   said_.clear();
-  if (act.kind == Act::Kind::stay) {
-    stroke_ = {};
-    return;
-  }
   if (!is_motion(act)) {
+    if (act.kind != Act::Kind::undo && act.kind != Act::Kind::redo) arrive();
     stroke_ = {};
-    return change(act);
+    if (act.kind != Act::Kind::stay) change(act);
+    return;
   }
   if (document_.tools.empty()) throw InputError("no tool is there to be led: pull at a place first");
   if (!stroke_.begun) remember();
@@ -289,6 +298,9 @@ void ClaySession::change(const Act& act) {
   } else if (act.kind == Act::Kind::grab) {
     grab(act, next);
     next.grabs = ++grabs_;
+  } else if (act.kind == Act::Kind::push) {
+    push(act, next);
+    next.grabs = ++grabs_;
   } else if (act.kind == Act::Kind::release) {
     if (next.tools.empty()) return;
     next.tools.pop_back();
@@ -321,11 +333,11 @@ void ClaySession::grab(const Act& act, ClayDocument& next) const {
     throw InputError(fmt::format("\"{}\" is held: free it before it is pulled at", act.name));
   const auto same = std::find_if(next.tools.begin(), next.tools.end(), [&](const ClayTool& tool) {
     if (!act.name.empty()) return tool.where == face;
-    return tool.radius > 0 && (tool.centre - act.at).norm() < tool.radius + act.radius;
+    return tool.radius > 0 && !tool.shape && (tool.centre - act.at).norm() < tool.radius + act.radius;
   });
   if (same != next.tools.end())  // it is taken up again
     return static_cast<void>(std::rotate(same, same + 1, next.tools.end()));
-  if (next.tools.size() == kMostTools) throw InputError("16 tools are there: let one go first");
+  refuse_more_tools(next);
   ClayTool tool;
   simulate::Selection where = simulate::select_by_name(act.name, "pull");
   tool.where = face;
@@ -341,6 +353,33 @@ void ClaySession::grab(const Act& act, ClayDocument& next) const {
   if (points.empty()) throw InputError("no matter lies there");
   tool.middle = mean_rest(points);
   tool.pose = rigid_fit(points);
+  next.tools.push_back(std::move(tool));
+}
+
+// A tool that pushes is put down where it touches the part as it is now, and comes from where it is clear of the part as its
+// shape was kept: the scene leads it from there.
+void ClaySession::push(const Act& act, ClayDocument& next) const {
+  const bool plate = act.name == "plate";
+  const Vec3 centre = act.at + (plate ? 0 : act.radius) * act.from;
+  const auto same = std::find_if(next.tools.begin(), next.tools.end(), [&](const ClayTool& tool) {
+    return tool.shape && tool.shape->plate == plate &&
+           (tool.middle + tool.pose.displacement - centre).norm() < tool.radius;
+  });
+  if (same != next.tools.end())  // it is taken up again
+    return static_cast<void>(std::rotate(same, same + 1, next.tools.end()));
+  refuse_more_tools(next);
+  simulate::Scene scene = simulate::parse_scene(scene_text(next, base_, false), "what acts on the part");
+  ClayTool tool;
+  tool.radius = act.radius;
+  tool.shape = {plate, act.radius, plate ? simulate::kPlateRounding * act.radius : act.radius};
+  tool.normal = -act.from;
+  const auto ways =
+      ways_clear(*next.now.body, scene, *tool.shape, {centre, tool.normal}, act.from, *next.displacement);
+  if (!ways)
+    throw InputError("the part is in the tool's way all along: choose another place or a smaller tool");
+  tool.middle = centre + ((*ways)[0] + (*ways)[1]) * act.from;
+  tool.pose.displacement = -(*ways)[1] * act.from;
+  tool.where = shape_text(*tool.shape, {tool.middle, tool.normal});
   next.tools.push_back(std::move(tool));
 }
 
@@ -383,23 +422,29 @@ void ClaySession::take_up(ClayDocument next) {
   scene.events.clear();  // they have happened to the body
   (void)materials_of_parts(scene, *next.now.body);
   std::unique_ptr<PulledBody> model;
-  const bool held =
-      !scene.get<simulate::Supports>().ties.empty() || !scene.get<simulate::Loads>().loads.empty();
+  const bool held = !scene.get<simulate::Supports>().ties.empty() ||
+                    !scene.get<simulate::Loads>().loads.empty() || !next.tools.empty();
   if (held) {
     Progress silent("", Progress::Mode::silent);
     check_actions(scene, *next.now.body, silent);
-    std::vector<Vec3> middles;
-    std::vector<ToolPose> poses;
+    std::vector<LedTool> tools;
+    int most = 1;  // steps from rest
     for (const ClayTool& tool : next.tools) {
-      middles.push_back(tool.middle);
-      poses.push_back(tool.pose);
+      tools.push_back({tool.middle, tool.shape.has_value()});
+      most = std::max(most, tool.steps(tool.pose));
     }
     const double arm = 0.1 * bounding_box(next.now.body->rest).diagonal();
-    const auto found = [&](const std::vector<Vec3>& start) {
-      model = std::make_unique<PulledBody>(*next.now.body, scene, middles, arm, start);
-      return model->lead(poses, kTolerance, kIterations, stop_asked());
+    const auto found = [&](const std::vector<Vec3>& start, int steps) {
+      model = std::make_unique<PulledBody>(*next.now.body, scene, tools, arm, start);
+      for (int step = 1; step <= steps; ++step) {
+        std::vector<ToolPose> poses;
+        for (const ClayTool& tool : next.tools)
+          poses.push_back(step == steps ? tool.pose : tool.pose * (double(step) / steps));
+        if (!model->lead(poses, kTolerance, kIterations, stop_asked())) return false;
+      }
+      return true;
     };
-    if (!found(*next.displacement) && !found(*displacement_of(*next.now.body)))
+    if (!found(*next.displacement, 1) && !found(*displacement_of(*next.now.body), most))
       throw InputError("no equilibrium is found there");
     next.displacement = std::make_shared<const std::vector<Vec3>>(model->whole_displacement());
   } else {
@@ -451,13 +496,14 @@ bool ClaySession::more_waits() {
   return !queue_.empty();
 }
 
-// One step of the tool towards where it should be; a shorter one where the part does not follow so far at once.
-void ClaySession::lead() {
+// One step of the tool towards where it should be; a shorter one where the part does not follow so far at once. `obeys`: it
+// stops trying where other acts wait.
+void ClaySession::lead(bool obeys) {
   const ToolPose before = document_.tools.back().pose, whole = goal() - before;
   const Vec3 force = model_->felt().back().force;
-  double share = 1;
+  double share = 1.0 / document_.tools.back().steps(whole);
   for (int tries = 0; tries < kMostHalvings; ++tries, share /= 2) {
-    if (tries > 0 && more_waits()) return;  // the hand has gone elsewhere
+    if (tries > 0 && obeys && more_waits()) return;  // the hand has gone elsewhere
     const ToolPose pose = share == 1 ? before + whole : before + whole * share;
     if (!model_->lead(poses_with(share == 1 ? goal() : pose), kDragTolerance, kDragIterations, stop_asked()))
       continue;
@@ -468,6 +514,14 @@ void ClaySession::lead() {
   }
   stroke_ = {};
   throw InputError("the part does not follow further: it would fold or buckle");
+}
+
+// What is done to the part next happens with the tool where it was led.
+void ClaySession::arrive() {
+  while (stroke_.begun && !stroke_.hand && !(document_.tools.back().pose == stroke_.target)) {
+    lead(false);
+    publish();
+  }
 }
 
 void ClaySession::refine() {
@@ -497,7 +551,8 @@ void ClaySession::settle(bool settled) {
 }
 
 std::string ClaySession::head(std::size_t bytes) const {
-  Json felt = Json::array(), place = Json::array(), names = Json::array(), middles = Json::array();
+  Json felt = Json::array(), place = Json::array(), names = Json::array(), middles = Json::array(),
+       shapes = Json::array();
   for (std::size_t t = 0; t < document_.tools.size(); ++t) {
     const ClayTool& tool = document_.tools[t];
     const PulledBody::Felt by_part = model_ ? model_->felt()[t] : PulledBody::Felt{};
@@ -505,6 +560,7 @@ std::string ClaySession::head(std::size_t bytes) const {
     place.push_back(numbers(tool.pose.displacement, tool.pose.turn));
     names.push_back(fmt::format("tool {}", t + 1));
     middles.push_back({tool.middle.x(), tool.middle.y(), tool.middle.z()});
+    shapes.push_back(shape_of(tool));
   }
   Json painted = Json::object();
   for (const auto& [part, material] : document_.painted) painted[printable(part)] = printable(material);
@@ -516,6 +572,7 @@ std::string ClaySession::head(std::size_t bytes) const {
                {"place", place},
                {"tools", names},
                {"middles", middles},
+               {"shapes", shapes},
                {"holds", document_.holds},
                {"undo", !undo_.empty()},
                {"redo", !redo_.empty()},

@@ -57,12 +57,14 @@ class ClaySession {
   void perform(const Act& act);
   void change(const Act& act);
   void grab(const Act& act, ClayDocument& next) const;
+  void push(const Act& act, ClayDocument& next) const;
   void keep(ClayDocument& next) const;
   void paint(const Act& act, ClayDocument& next) const;
   void alter(const Act& act, ClayDocument& next) const;
   void take_up(ClayDocument next);
   void travel(bool back);
-  void lead();
+  void lead(bool obeys = true);
+  void arrive();
   void refine();
   void settle(bool settled);
   [[nodiscard]] ToolPose goal() const;

@@ -11,6 +11,7 @@
 #include "simulate/effects/supports.h"
 #include "simulate/equilibrium/equilibrium.h"
 #include "simulate/events/fused.h"
+#include "simulate/indent/indenters.h"
 #include "simulate/matter/coplanar_elements.h"
 #include "simulate/models/rest_shape.h"
 #include "simulate/models/set_rest_shape.h"
@@ -21,6 +22,9 @@
 
 namespace flexel::clay {
 namespace {
+
+constexpr int kLoweringIterations = 40;
+constexpr double kLeastScale = 1e-2;  // of the strongest force so far
 
 simulate::Problem problem_of(const simulate::Scene& scene, const Body& body,
                              const simulate::Fragments& fragments) {
@@ -38,9 +42,14 @@ simulate::Problem problem_of(const simulate::Scene& scene, const Body& body,
   return problem;
 }
 
+std::size_t pushers_of(const std::vector<LedTool>& tools) {
+  return static_cast<std::size_t>(
+      std::count_if(tools.begin(), tools.end(), [](const LedTool& tool) { return tool.pushes; }));
+}
+
 }  // namespace
 
-void refuse_unled(const simulate::Scene& scene) {
+void refuse_unled(const simulate::Scene& scene, std::size_t pushers) {
   const auto refuse = [&](const char* what) {
     throw InputError(scene.name, std::string(what) + ": hands lead parts at equilibrium, without contact");
   };
@@ -56,32 +65,49 @@ void refuse_unled(const simulate::Scene& scene) {
   if (simulate::settles(scene)) refuse("contact or rigid parts");
   for (const simulate::Tie& tie : scene.get<simulate::Supports>().ties)
     if (tie.link) refuse("a load with a rigid link");
+  if (scene.get<simulate::Indenters>().indenters.size() != pushers)
+    throw InputError(scene.name, "[[indenter]]: a hand pushes with balls and plates of its own");
 }
 
-void refuse_unled(const simulate::Scene& scene, const Body& body) {
-  refuse_unled(scene);
+std::optional<std::array<double, 2>> ways_clear(const Body& body, const simulate::Scene& scene,
+                                                const simulate::IndenterShape& shape,
+                                                const simulate::IndenterPlace& place, const Vec3& away,
+                                                const std::vector<Vec3>& now) {
+  const simulate::Problem problem = problem_of(scene, body, simulate::find_fragments(body));
+  const std::optional<double> first = way_clear(shape, place, away, problem, now);
+  if (!first) return std::nullopt;
+  const simulate::IndenterPlace next{place.centre + *first * away, place.normal};
+  const std::optional<double> second = way_clear(shape, next, away, problem, problem.settled);
+  if (!second) return std::nullopt;
+  return std::array{*first, *second};
+}
+
+void refuse_unled(const simulate::Scene& scene, const Body& body, std::size_t pushers) {
+  refuse_unled(scene, pushers);
   if (simulate::is_quadratic(scene, body))
     throw InputError(scene.name, "model \"quadratic\": hands lead parts of the other models");
 }
 
 PulledBody::~PulledBody() = default;
 
-PulledBody::PulledBody(const Body& body, simulate::Scene scene, std::vector<Vec3> middles, double arm,
+PulledBody::PulledBody(const Body& body, simulate::Scene scene, std::vector<LedTool> tools, double arm,
                        std::vector<Vec3> start)
     : body_(body),
       fragments_(simulate::find_fragments(body)),
-      problem_((refuse_unled(scene, body), problem_of(scene, body, fragments_))),
-      middles_(std::move(middles)),
+      problem_((refuse_unled(scene, body, pushers_of(tools)), problem_of(scene, body, fragments_))),
+      tools_(std::move(tools)),
       arm_(arm),
-      poses_(middles_.size()),
-      felt_(middles_.size()) {
+      poses_(tools_.size()),
+      felt_(tools_.size()) {
   std::vector<simulate::Tie>& ties = scene.get<simulate::Supports>().ties;
-  first_tool_ = ties.size() - middles_.size();
-  for (std::size_t t = 0; t < middles_.size(); ++t) {
-    simulate::Motion& motion = ties[first_tool_ + t].motion;
+  std::vector<simulate::Indenter>& indenters = scene.get<simulate::Indenters>().indenters;
+  std::size_t tie = ties.size() - (tools_.size() - indenters.size()), indenter = 0;
+  for (std::size_t t = 0; t < tools_.size(); ++t) {
+    reaction_.push_back(tools_[t].pushes ? ties.size() + indenter : tie);
+    simulate::Motion& motion = tools_[t].pushes ? indenters[indenter++].motion : ties[tie++].motion;
     poses_[t] = {motion.translation, motion.angle * motion.axis};
     motion.link = links_.emplace_back(std::make_shared<simulate::RigidLink>());
-    motion.link->middle = middles_[t];
+    motion.link->middle = tools_[t].middle;
   }
   lead_ties(poses_);
   std::vector<simulate::ActiveEffect> effects = active_effects(scene.effects, problem_);
@@ -120,8 +146,19 @@ bool PulledBody::solve(const std::vector<ToolPose>& poses, double tolerance, int
   options.steps = simulate::NewtonSteps::full;
   options.tolerance = tolerance;
   options.max_iterations = iterations;
-  const simulate::NewtonOutcome outcome = simulate::newton(
-      *mechanics_, trial, options, [&](double, const std::string&) { stop(); }, &memory_);
+  // A tool that leaves the part leaves no force to measure the others by.
+  if (pushers_of(tools_) > 0) options.least_scale = kLeastScale * strongest_;
+  const simulate::State begun = trial;
+  const auto asked = [&](double, const std::string&) { stop(); };
+  simulate::NewtonOutcome outcome = simulate::newton(*mechanics_, trial, options, asked, &memory_);
+  // Where what touches changes a whole step may be no good; the energy tells the way.
+  if (!outcome.converged && pushers_of(tools_) > 0) {
+    memory_ = {};
+    trial = begun;
+    options.steps = simulate::NewtonSteps::lowering;
+    options.max_iterations = std::max(iterations, kLoweringIterations);
+    outcome = simulate::newton(*mechanics_, trial, options, asked, &memory_);
+  }
   if (!outcome.converged) {
     memory_ = {};
     lead_ties(poses_);
@@ -135,7 +172,7 @@ bool PulledBody::solve(const std::vector<ToolPose>& poses, double tolerance, int
   return true;
 }
 
-// The ties hold the links, at the load's whole share.
+// Ties and indenters hold the links, at the load's whole share.
 void PulledBody::lead_ties(const std::vector<ToolPose>& poses) {
   for (std::size_t t = 0; t < poses.size(); ++t) {
     links_[t]->translation = poses[t].displacement;
@@ -158,9 +195,11 @@ void PulledBody::measure() {
   simulate::SimulateResult found;
   mechanics_->report(state_, found);
   for (std::size_t t = 0; t < felt_.size(); ++t) {
-    const simulate::Reaction& reaction = found.reactions[first_tool_ + t];
+    const simulate::Reaction& reaction = found.reactions[reaction_[t]];
+    const Vec3 middle = tools_[t].middle + poses_[t].displacement;
     felt_[t].force = -reaction.force;
-    felt_[t].torque = -(reaction.moment - (middles_[t] + poses_[t].displacement).cross(reaction.force));
+    strongest_ = std::max(strongest_, reaction.force.norm());
+    felt_[t].torque = -(reaction.moment - middle.cross(reaction.force));
   }
 }
 

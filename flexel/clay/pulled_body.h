@@ -1,35 +1,50 @@
 // A body that stays in equilibrium while tools lead places of it: each solution begins where the last one ended, and keeps its
 // tangent and preconditioner while they serve.
 #pragma once
+#include <array>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "flexel/clay/tool_pose.h"
 #include "simulate/equilibrium/newton.h"
+#include "simulate/indent/indenter_shape.h"
 #include "simulate/matter/fragments.h"
 #include "simulate/scene/scene.h"
 
 namespace flexel::clay {
 
 // Throws InputError: what hands cannot lead (a run in time, modes, buckling, a shape that the scene itself keeps, heat,
-// shrinkage, contact, rigid links; with a body also model "quadratic").
-void refuse_unled(const simulate::Scene& scene);
-void refuse_unled(const simulate::Scene& scene, const Body& body);
+// shrinkage, contact, rigid links, other indenters than the hands' `pushers`; with a body also model "quadratic").
+void refuse_unled(const simulate::Scene& scene, std::size_t pushers = 0);
+void refuse_unled(const simulate::Scene& scene, const Body& body, std::size_t pushers = 0);
+
+// m: how far along `away` a tool has to be from `place` to be clear of the part as it is moved by `now` and as `scene`
+// finds it, in this order, the second from where the first ends. Nothing: it is clear nowhere near.
+[[nodiscard]] std::optional<std::array<double, 2>> ways_clear(const Body& body, const simulate::Scene& scene,
+                                                              const simulate::IndenterShape& shape,
+                                                              const simulate::IndenterPlace& place,
+                                                              const Vec3& away, const std::vector<Vec3>& now);
+
+struct LedTool {
+  Vec3 middle = Vec3::Zero();  // m, rest: it turns about this
+  bool pushes = false;         // an [[indenter]], else a [[move]]
+};
 
 class PulledBody {
  public:
-  // `body` outlives it. The last `middles.size()` [[move]] of `scene` are tools, turned about these [m, rest]; `arm` [m]: how large
-  // one is. Begins at `start` (elements) [m]. Throws InputError: as flexel-simulate would of the scene, and as
-  // refuse_unled does.
-  PulledBody(const Body& body, simulate::Scene scene, std::vector<Vec3> middles, double arm,
+  // `body` outlives it. The last [[move]] and [[indenter]] of `scene` are the tools, in their order; `arm` [m]: how large one is.
+  // Begins at `start` (elements) [m]. Throws InputError: as flexel-simulate would of the scene, and as refuse_unled does.
+  PulledBody(const Body& body, simulate::Scene scene, std::vector<LedTool> tools, double arm,
              std::vector<Vec3> start);
   PulledBody(const PulledBody&) = delete;
   PulledBody& operator=(const PulledBody&) = delete;
   ~PulledBody();
 
   // Moves to equilibrium with tools at `poses`. False, and nothing has changed, where it is not found in `iterations` of Newton's
-  // method. `tolerance`: of the residual, relative to loads and reactions. `stop` is asked often, and may throw.
+  // method. `tolerance`: of the residual, relative to loads and reactions. `stop` is asked often, and may throw. A tool that
+  // pushes goes no further at once than ClayTool::steps() says.
   bool lead(const std::vector<ToolPose>& poses, double tolerance, int iterations,
             const std::function<void()>& stop);
 
@@ -59,16 +74,16 @@ class PulledBody {
   std::unique_ptr<simulate::Mechanics> mechanics_;
   simulate::NewtonMemory memory_;
   simulate::State state_;
-  std::vector<Vec3> middles_;
-  std::vector<std::shared_ptr<simulate::RigidLink>> links_;  // (tools) that the ties follow
+  std::vector<LedTool> tools_;
+  std::vector<std::shared_ptr<simulate::RigidLink>> links_;  // (tools) that ties and indenters follow
+  std::vector<std::size_t> reaction_;                        // (tools) numbers of theirs
   double arm_;
-  std::size_t first_tool_ = 0;  // among the ties
   std::vector<ToolPose> poses_;
   std::vector<Felt> felt_;
   // The way that the last motion of the tools led the elements: how they answer to more of it.
   std::vector<ToolPose> way_;
-  std::vector<Vec3> answer_;  // (elements) m
-  double residual_ = 0;
+  std::vector<Vec3> answer_;             // (elements) m
+  double residual_ = 0, strongest_ = 0;  // 1; N, of a tool so far
 };
 
 }  // namespace flexel::clay

@@ -1,6 +1,7 @@
 // [[fix]], [[move]], and [[load]] by a rigid link, of a scene.
 #include <fmt/format.h>
 
+#include "simulate/conditions/rotation_key.h"
 #include "simulate/effects/loads.h"
 #include "simulate/effects/supports.h"
 #include "simulate/input/scene_selection.h"
@@ -37,30 +38,6 @@ void parse_displacement(TableReader& reader, Tie& tie) {
       tie.motion.translation[static_cast<Eigen::Index>(axis)] =
           reader.to_quantity(item, Dimension::length, "displacement");
   }
-}
-
-void parse_rotation(TableReader& reader, Tie& tie) {
-  const SceneValue* value = reader.find("rotation");
-  if (!value) return;
-  TableReader rotation(*value, reader.file(), "rotation of [[move]]");
-  (void)rotation.require("axis", "[0, 0, 1]");
-  tie.motion.axis = *rotation.direction("axis");
-  tie.motion.through = rotation.to_vector(rotation.require("through", "[\"0 mm\", \"0 mm\", \"0 mm\"]"),
-                                          Dimension::length, "through");
-  tie.motion.angle = rotation.to_quantity(rotation.require("angle", "\"30 deg\""), Dimension::angle, "angle");
-  tie.motion.arc_from = rotation.vector("arc_from", Dimension::length);
-  rotation.finish();
-  if (tie.motion.arc_from) {
-    constexpr double kAcross = 1e-9;  // of the way, that is more than rounding
-    const Vec3 way = tie.motion.through - *tie.motion.arc_from;
-    if (tie.motion.angle == 0) rotation.fail("\"arc_from\" needs an \"angle\" other than 0");
-    if (!(tie.motion.axis.cross(way).norm() > kAcross * way.norm()))
-      rotation.fail(
-          "the way from \"arc_from\" to \"through\" makes no arc: it needs a length, and another direction "
-          "than \"axis\"");
-  }
-  if (!(tie.axes[0] && tie.axes[1] && tie.axes[2]))
-    reader.fail("[[move]] has a rotation and a free axis; a rotation leads all three");
 }
 
 Tie parse_link(TableReader& reader) {
@@ -107,7 +84,9 @@ void Supports::parse(TableReader& scene, Parameters& parameters) {
     tie.where = require_where(reader);
     tie.name = reader.text("name").value_or(describe(tie.where));
     parse_displacement(reader, tie);
-    parse_rotation(reader, tie);
+    read_rotation(reader, tie.motion);
+    if (reader.find("rotation") && !(tie.axes[0] && tie.axes[1] && tie.axes[2]))
+      reader.fail("[[move]] has a rotation and a free axis; a rotation leads all three");
     tie.course = parse_course(reader);
     reader.finish();
     if (!reader.find("displacement") && !reader.find("rotation"))

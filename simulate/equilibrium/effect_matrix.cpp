@@ -1,9 +1,10 @@
-// An effect does not say where it pulls: all elements are moved, each its own way, and those with forces on them
-// are the ones.
+// Most effects do not say where they pull: all elements are moved, each its own way, and those with forces on them
+// are the ones. Of one-sided forces that shows some, and they say it.
 #include "simulate/equilibrium/effect_matrix.h"
 
 #include <algorithm>
 
+#include "simulate/indent/indenters.h"
 #include "simulate/linear/level.h"
 
 namespace flexel::simulate {
@@ -22,6 +23,8 @@ std::vector<std::uint8_t> touched_elements(const Body& body, const BlockMatrix& 
   for (const ActiveEffect& effect : effects)
     if (effect->adds_stiffness()) effect->add_forces(state, forces);
   std::vector<std::uint8_t> touched(n, 0);
+  if (const Indenters* indenters = find_indenters(effects))
+    for (const std::uint32_t e : indenters->may_push()) touched[e] = 1;
   for (std::size_t e = 0; e < n; ++e)
     if (forces[e] != Vec3::Zero())
       for (std::uint64_t q = pattern.row_offsets[e]; q < pattern.row_offsets[e + 1]; ++q)

@@ -27,6 +27,7 @@
 #include "base/units.h"
 #include "simulate/equilibrium/load_step_length.h"
 #include "simulate/equilibrium/rigid_link_equilibrium.h"
+#include "simulate/indent/indenters.h"
 #include "simulate/input/scene_words.h"
 #include "simulate/models/rest_shape.h"
 #include "simulate/result/overload.h"
@@ -39,13 +40,14 @@ constexpr double kSmallestIncrement = 1.0 / 1024;  // of the first load step
 constexpr double kLoweringIncrement = 1.0 / 32;    // from this one on energy-lowering steps are tried too
 constexpr int kEasyIterations = 10;
 constexpr int kFullStepIterations = 20;
-constexpr int kIterations = 100;            // of Newton in a run, unless the scene says
-constexpr int kOverloadIterations = 40;     // likewise where the load is out of proportion
-constexpr int kIterationsPerLoadStep = 10;  // that one which ends in equilibrium adds to those of the run
-constexpr double kLargestTurn = 0.25;       // turns, of a rotation in one load step
-constexpr double kBalanced = 1e-2;          // relative residual of an attempt that fails as buckling does
-constexpr double kPush = 0.01;              // of the spacing, to leave a branch with
-constexpr double kPushedIncrement = 0.25;   // of the first load step: how far beyond the branching
+constexpr int kIterations = 100;                // of Newton in a run, unless the scene says
+constexpr int kOverloadIterations = 40;         // likewise where the load is out of proportion
+constexpr int kIterationsPerLoadStep = 10;      // that one which ends in equilibrium adds to those of the run
+constexpr int kIterationsPerIndentedStep = 40;  // likewise, with indenters
+constexpr double kLargestTurn = 0.25;           // turns, of a rotation in one load step
+constexpr double kBalanced = 1e-2;              // relative residual of an attempt that fails as buckling does
+constexpr double kPush = 0.01;                  // of the spacing, to leave a branch with
+constexpr double kPushedIncrement = 0.25;       // of the first load step: how far beyond the branching
 constexpr int kPushedIterations = 300;
 constexpr int kMostPushes = 4;         // of a run
 constexpr double kUnsupported = 1e-9;  // of the stiffness of an element in its stiffest direction
@@ -60,12 +62,14 @@ std::string point_name(const Vec3& at) {
   return fmt::format("({}, {}, {})", human_length(at.x()), human_length(at.y()), human_length(at.z()));
 }
 
-// Load steps that follow every rotation along its arc.
-int least_load_steps(const Constraints& constraints) {
-  double turns = 0;
-  for (const Motion& motion : constraints.motions)
-    turns = std::max(turns, std::abs(motion.angle) / (2 * std::numbers::pi));
-  return static_cast<int>(std::ceil(turns / kLargestTurn - 1e-9));
+// Load steps that follow every rotation along its arc, and lead no indenter too far.
+int least_load_steps(const Mechanics& mechanics) {
+  double steps = 1;
+  for (const Motion& motion : mechanics.constraints().motions)
+    steps = std::max(steps, std::abs(motion.angle) / (2 * std::numbers::pi) / kLargestTurn);
+  if (const Indenters* indenters = find_indenters(mechanics.effects()))
+    steps = std::max(steps, 1 / indenters->longest_share());
+  return static_cast<int>(std::ceil(steps - 1e-9));
 }
 
 void restore_followers(Mechanics& mechanics, const FollowerMemory& memory) {
@@ -84,8 +88,10 @@ class LoadStepping {
         settings_(settings),
         progress_(progress),
         start_(start),
-        first_(1.0 / std::max(settings.load_steps, least_load_steps(mechanics.constraints()))),
-        length_(first_) {}
+        first_(1.0 / std::max(settings.load_steps, least_load_steps(mechanics))),
+        length_(first_) {
+    indented_ = find_indenters(mechanics.effects()) != nullptr;
+  }
 
   EquilibriumResult operator()();
 
@@ -132,11 +138,14 @@ class LoadStepping {
   bool pushed_ = false;            // the next attempt starts beside the last equilibrium
   int pushes_ = 0;
   double least_residual_ = 1;  // relative, of the attempts since the last equilibrium
+  bool indented_ = false;  // a whole step is no good where what touches changes, and the energy tells the way
+  bool lowers_ = false;    // ... and one has not been
 };
 
 int LoadStepping::iterations_left() const {
   const int allowed = settings_.newton_iterations.value_or(overloaded() ? kOverloadIterations : kIterations);
-  return allowed + kIterationsPerLoadStep * result_.load_steps + kPushedIterations * pushes_ + spent_near_ -
+  const int more = indented_ ? kIterationsPerIndentedStep : kIterationsPerLoadStep;
+  return allowed + more * result_.load_steps + kPushedIterations * pushes_ + spent_near_ -
          result_.newton_iterations;
 }
 
@@ -317,13 +326,15 @@ void LoadStepping::solve() {
     farthest_reach_ = kFarReach * bounding_box(mechanics_.body().rest).diagonal();
   hopeless_reach_ = out_of_proportion();
   while (done_ < 1) {
-    if (attempt(NewtonSteps::full, kFullStepIterations)) continue;
+    if (!lowers_ && attempt(NewtonSteps::full, kFullStepIterations)) continue;
     if (reach_ > hopeless_reach_) refuse_load();
     hopeless_reach_ = std::numeric_limits<double>::infinity();  // the first answer alone counts
     if (begin_near()) continue;
-    if (iterations_left() > 0 && length_.get() <= kLoweringIncrement * first_ && !mechanics_.follows() &&
-        attempt(NewtonSteps::lowering, NewtonOptions().max_iterations))
+    if (iterations_left() > 0 && (indented_ || length_.get() <= kLoweringIncrement * first_) &&
+        !mechanics_.follows() && attempt(NewtonSteps::lowering, NewtonOptions().max_iterations)) {
+      lowers_ = indented_;
       continue;
+    }
     if (!gives_up()) {
       length_.failed(trial_.share - done_);
       // a part that rolls up turns as far with each step of the load
@@ -348,7 +359,10 @@ void refuse_free_motions(Mechanics& mechanics, const State& start, const std::st
   // says nothing of what holds it.
   const bool stressed = RestShapes(mechanics.body()).any();
   const std::vector<Mat3> none(stressed ? mechanics.body().cell_count() : 0, Mat3::Zero());
-  mechanics.assemble(start, {false, stressed ? &none : nullptr});
+  // Indenters hold nothing: they are taken where they begin.
+  State begun = start;
+  begun.share = 0;
+  mechanics.assemble(begun, {false, stressed ? &none : nullptr});
   mechanics.eliminate_prescribed();
   const std::vector<FreeMotion> free =
       free_motions(mechanics.tangent(), node_geometry(mechanics.body(), start));

@@ -15,6 +15,7 @@
 #include "simulate/effects/plasticity.h"
 #include "simulate/effects/rigid.h"
 #include "simulate/effects/supports.h"
+#include "simulate/indent/indenters.h"
 #include "simulate/joints/joints.h"
 #include "simulate/paper/connection_friction.h"
 #include "simulate/thermal/thermal.h"
@@ -111,6 +112,25 @@ std::vector<SceneKey> support_keys() {
       {r, "through", K::vector, D::length, "required", "a point of the axis"},
       {r, "angle", K::quantity, D::angle, "required", "more than a turn is what it says"},
       {r, "arc_from", K::vector, D::length, "", "the way from here to through becomes an arc of the angle"}};
+}
+
+std::vector<SceneKey> indenter_keys() {
+  const std::string t = "[[indenter]]", b = "ball of [[indenter]]", p = "plate of [[indenter]]",
+                    r = "rotation of [[indenter]]";
+  return {{t, "name", K::text, {}, "\"indenter\"", "for the summary"},
+          {t, "ball", K::table, {}, "required; or plate", "a rigid ball, which begins outside the parts"},
+          {t, "plate", K::table, {}, "required; or ball", "the flat end of a round, rigid rod, likewise"},
+          {t, "displacement", K::vector, D::length, "0", "that it is led by"},
+          {t, "rotation", K::table, {}, "", "comes before the displacement"},
+          {b, "centre", K::vector, D::length, "required", "where it begins"},
+          {b, "radius", K::quantity, D::length, "required", "at least a cell"},
+          {p, "centre", K::vector, D::length, "required", "of its face, where it begins"},
+          {p, "normal", K::direction, {}, "required", "that the face looks along"},
+          {p, "radius", K::quantity, D::length, "required", "at least a cell"},
+          {p, "rounding", K::quantity, D::length, "radius / 4", "radius of its edge"},
+          {r, "axis", K::direction, {}, "required", "right-handed"},
+          {r, "through", K::vector, D::length, "required", "a point of the axis"},
+          {r, "angle", K::quantity, D::angle, "required", "more than a turn is what it says"}};
 }
 
 std::vector<SceneKey> bond_keys() {
@@ -253,6 +273,8 @@ const std::vector<EffectRow>& effect_rows() {
       row<Gravity>("weight and attraction", kEverywhere, kEvery, {"gravity"}, gravity_keys()),
       row<Loads>("forces, torques and pressures", kEverywhere, kEvery, {"load"}, load_keys()),
       row<Supports>("places that are held or led", kEverywhere, kEvery, {"move"}, support_keys()),
+      row<Indenters>("balls and plates that push", ActsIn::equilibrium, "cells, springs", {"indenter"},
+                     indenter_keys()),
       row<Thermal>("heat and shrinkage", ActsIn::equilibrium, "cells, quadratic", {"thermal", "shrinkage"},
                    thermal_keys()),
       row<Bonds>("parts that touch hold together", kEverywhere, kEvery, {}, bond_keys()),

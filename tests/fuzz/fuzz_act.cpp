@@ -1,4 +1,5 @@
 // Mutated messages of hands to flexel clay: refused, or what they say is finite and within bounds.
+#include <cmath>
 #include <cstdlib>
 
 #include "base/error.h"
@@ -16,7 +17,8 @@ constexpr const char* kMessage =
     "0.004\n"
     "hand 0 0 -0.005\nhand 0 0 -0.005 0 0.1 0\n0 1e-3 0 0\n0 1e-3 2e-3 0 0 0.1 "
     "0\nstay\nrelease\nkeep\nundo\nredo\n"
-    "material PLA\ncarve at 0.08 0.02 0.003 0.004\npaint steel bracket\nglue at 0.08 0.02 0.003 0.004 "
+    "material PLA\ncarve at 0.08 0.02 0.003 0.004\npush ball 0.08 0.02 0.006 0 0 1 0.004\npush plate 0.08 "
+    "0.02 0.006 0 0 1 0.004\npaint steel bracket\nglue at 0.08 0.02 0.003 0.004 "
     "0.0005\ntake\n";
 
 // Names and numbers of a message are those of a scene that can be read.
@@ -29,6 +31,13 @@ void check_scene(const clay::ActMessage& message) {
       document.changes.push_back(clay::change_text(act));
     if (act.kind == clay::Act::Kind::paint) document.painted[act.name] = act.material;
     if (act.kind == clay::Act::Kind::hold) document.holds.push_back(act.name);
+    if (act.kind == clay::Act::Kind::push) {
+      if (std::abs(act.from.norm() - 1) > 1e-9) std::abort();
+      const simulate::IndenterShape shape{act.name == "plate", act.radius, act.radius};
+      clay::ClayTool& tool = document.tools.emplace_back();
+      tool.shape = shape;
+      tool.where = clay::shape_text(shape, {act.at, -act.from});
+    }
     if (act.kind == clay::Act::Kind::grab)
       document.tools.push_back(
           {act.name.empty() ? clay::where_of_ball(act.at, act.radius) : clay::where_of_name(act.name), act.at,

@@ -190,6 +190,46 @@ def test_a_ball_is_carved_out_by_a_click():
         expect_silence(browser)
 
 
+def test_a_ball_pushes_where_it_is_dragged_and_a_plate_by_keys():
+    bracket()
+    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _), chromium() as browser:
+        browser.open(url.geturl())
+        settle(browser)
+        browser.choose("face", "bracket/1")
+        browser.run("document.getElementById('face-hold').click()")
+        browser.wait("flexelView.clay.frame.holds.length === 1")
+        browser.choose("ball", "6")
+        browser.run("flexelView.controls.look('iso')")
+        choose_hand(browser, "push-ball")
+        expect(browser.run("return document.getElementById('along').value") == "in", "it goes into the face")
+        x, y = centre_of_face(browser, "bracket/3")
+        scale = browser.run("const {picture} = flexelView; return picture.pixelsPerMetre(picture.panels[0], picture.layout[0])")
+        browser.mouse(("move", x, y), ("down",))
+        browser.wait("flexelView.clay.drag?.base")
+        browser.mouse(("move", x, y + 0.0005 * scale), ("move", x, y + 0.001 * scale), ("move", x, y + 0.0015 * scale), ("up",))
+        settle(browser)
+        frame = browser.run("const {positions, ...frame} = flexelView.clay.frame; return frame")
+        place, felt = frame["place"][0], frame["felt"][0]
+        expect(not frame["said"] and -0.003 < place[2] < -0.0005 and max(map(abs, place[:2])) < 0.01 * abs(place[2]) and felt[2] > 1, f"into the face: {frame['said']} {place} {felt}")
+        expect_same_run(url, frame)
+        expect_drawn_as_saved(browser, url)
+        browser.choose("face", "bracket/3")
+        browser.run("document.getElementById('undo').click()")
+        browser.run("document.getElementById('undo').click()")
+        browser.wait("flexelView.clay.frame.tools.length === 0")
+        browser.run("document.getElementById('face-push-plate').focus()")
+        browser.keys("\ue007")
+        browser.wait("flexelView.clay.frame.shapes[0]?.kind === 'plate'")
+        browser.choose("lead-z", "-1")
+        browser.run("document.getElementById('lead').focus()")
+        browser.keys("\ue007")
+        browser.wait("flexelView.clay.frame.place[0]?.[2] === -0.001 && flexelView.clay.frame.settled", 60)
+        frame = browser.run("const {positions, ...frame} = flexelView.clay.frame; return frame")
+        expect(frame["felt"][0][2] > 1, f"it pushes: {frame['felt']}")
+        expect_same_run(url, frame)
+        expect_silence(browser)
+
+
 def test_a_ball_is_carved_out_by_keys_and_a_page_that_comes_later_draws_it():
     bracket()
     with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _), chromium(WINDOW) as browser:

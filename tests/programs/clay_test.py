@@ -249,6 +249,93 @@ def test_carving_is_that_of_the_saved_scene():
             expect(said in frame["said"] and frame["undo"], f"{lines}: {frame['said']!r}")
 
 
+ON_TOP = "0.07 0.02 0.006 0 0 1"  # of the arm of the bracket, and where it looks
+
+
+def test_a_push_is_that_of_the_saved_scene():
+    bracket()
+    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _):
+        hand = Hand(url, 16 * "a")
+        hand.act("hold bracket/1", f"push ball {ON_TOP} 0.006")
+        start = hand.last
+        expect(not start["said"] and start["felt"] == [6 * [0]] and start["place"] == [6 * [0]], f"it touches: {start['said']} {start['felt']} {start['place']}")
+        expect(start["shapes"] == [{"kind": "ball", "radius": 0.006, "normal": [0, 0, -1]}], f"{start['shapes']}")
+        frame = hand.act("0 0 0 -0.002", "stay")
+        force = frame["felt"][0]
+        expect(frame["place"][0][:3] == [0, 0, -0.002] and force[2] > 1, f"it is there, and the part pushes back: {frame['place']} {force}")
+        expect_same_run(url, frame)
+        reactions = json.loads(pathlib.Path("run.json").read_text())["reactions"]
+        sums = [sum(each["force"][k] for each in reactions) for k in range(3)]
+        expect(len(reactions) == 2 and max(map(abs, sums)) < 1e-6 * force[2], f"what the tool pushes with is held: {sums}")
+        # away again it feels nothing, and the part is as before
+        expect(hand.act("0 0 0 0.001")["felt"][0] == 6 * [0] and same(hand.last["positions"], start["positions"]), "the part springs back")
+        for act, state in (("undo", frame), ("undo", start), ("redo", frame)):
+            hand.act(act)
+            expect(same(hand.last["positions"], state["positions"]) and max(abs(a - b) for a, b in zip(hand.last["felt"][0], state["felt"][0])) < 1e-5 * force[2], act)
+        # a plate beside it, turned; a hand by a spring
+        hand.act("push plate 0.05 0.02 0.006 0 0 1 0.008", "hand 0 0 -0.0005", "hand 0 0 -0.001 0.02 0 0")
+        hand.act("stay")
+        expect(not hand.last["said"] and len(hand.last["place"]) == 2 and hand.last["felt"][1][2] > 1, f"{hand.last['said']} {hand.last['felt']}")
+        expect_same_run(url, hand.last)
+
+
+def test_a_push_at_a_bent_part_and_at_one_that_was_kept():
+    bracket()
+    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _):
+        hand = Hand(url, 16 * "a")
+        hand.act("hold bracket/1", "grab face bracket/2")
+        hand.act("0 0 0 -0.006")
+        # on top of the arm as it is now: at rest there is matter
+        frame = hand.act("push ball 0.05 0.02 0.001 0 0 1 0.005")
+        place = frame["place"][-1]
+        expect(not frame["said"] and place[2] < -0.001 and max(map(abs, frame["felt"][-1])) < 1, f"it comes from where it is clear: {frame['said']} {place} {frame['felt']}")
+        frame = hand.act("0 0 0 " + str(place[2] - 0.002), "stay")
+        expect(not frame["said"] and frame["felt"][-1][2] > 1, f"{frame['said']} {frame['felt']}")
+        expect_same_run(url, frame)
+        kept = hand.act("keep")
+        expect(not kept["said"] and kept["kept"] == 1 and kept["tools"] == [], f"{kept['said']}")
+        frame = hand.act("push ball 0.07 0.02 -0.002 0 0 1 0.005")  # inside: it is put where it is clear
+        expect(not frame["said"] and frame["middles"][-1][2] > 0.003 and frame["felt"][-1] == 6 * [0], f"{frame['middles']} {frame['felt']}")
+        hand.act("0 0 0 " + str(frame["place"][-1][2] - 0.004), "stay")
+        expect(not hand.last["said"] and hand.last["felt"][-1][2] > 0.5, f"{hand.last['said']} {hand.last['felt']}")
+        expect_same_run(url, hand.last)
+
+
+def test_a_ball_that_is_led_far_at_once_does_not_pass_through():
+    bracket()
+    with clay("bracket.step", "--size", "4 mm", "--material", "rubber") as (url, _):
+        hand = Hand(url, 16 * "a")
+        hand.act("hold bracket/1", f"push ball {ON_TOP} 0.005")
+        frame = hand.act("0 0 0 -0.02", "stay")
+        under = min(range(len(frame["positions"]) // 3), key=lambda e: math.dist(at_rest(url)[3 * e:3 * e + 3], (0.072, 0.02, 0.004)))
+        expect(not frame["said"] and frame["place"][0][2] == -0.02 and frame["felt"][0][2] > 0, f"{frame['said']} {frame['place']} {frame['felt']}")
+        expect(frame["positions"][3 * under + 2] < -0.013, f"the part is before it: {frame['positions'][3 * under:3 * under + 3]}")
+        expect_same_run(url, frame)
+
+
+def at_rest(url):
+    data = saved(url, "rest.f32")
+    return struct.unpack(f"<{len(data) // 4}f", data)
+
+
+def test_pushes_that_cannot_be_are_refused():
+    bracket()
+    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _):
+        hand = Hand(url, 16 * "a")
+        for wrong, said in (("push", "push: give"), ("push cone 0 0 0 0 0 1 1", "push: give"), ("push ball 0 0 0 0 0 0 1", "no direction"), ("push ball 0 0 0 0 0 1 0", "radius above 0"), ("push ball 0 0 0 0 0 1 1e9", "no number")):
+            status, text = hand.post(wrong)
+            expect(status == 400 and said in text, f"{wrong}: {status} {text}")
+        push = f"push ball {ON_TOP} 0.006"
+        for acts, said in (([push], "nothing holds part"), (["hold bracket/1", f"push ball {ON_TOP} 0.001"], "less than a cell"),
+                           (["carve at 0.04 0.02 0.006 0.009", push], "carved out"),
+                           (["undo", push, "carve at 0.04 0.02 0.006 0.009"], "carved out")):
+            frame = hand.act(*acts)
+            expect(said in frame["said"], f"{acts}: {frame['said']!r}")
+        expect(hand.act("0 0 0 -0.001", "stay")["felt"][0][2] > 1, "the tool that is there still pushes")
+    write("scene.toml", LOAD.format("", '[[indenter]]\nball = { centre = ["40 mm", "20 mm", "20 mm"], radius = "5 mm" }\n'))
+    expect_error(run("flexel", "clay", "bracket.step", "--scene", "scene.toml", "--size", "10 mm"), "flexel", "scene.toml", "[[indenter]]")
+
+
 def test_a_page_gets_the_surface_while_acts_wait():
     bracket()
     with clay("bracket.step", "--size", "4 mm") as (url, _):

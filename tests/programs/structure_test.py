@@ -19,7 +19,7 @@ formats/vtu formats/lattice formats/exchange
 meshes
 voxelize/types voxelize/mesh voxelize/distances voxelize/classify voxelize/heal voxelize/lattice voxelize
 simulate/laws simulate/input simulate/result simulate/linear simulate/state simulate/rigid simulate/conditions simulate/models
-simulate/kernels simulate/matter simulate/gravitation simulate/contact/points simulate/contact/pairs simulate/contact simulate/followers simulate/effects simulate/thermal simulate/paper simulate/joints simulate/events simulate/scene
+simulate/kernels simulate/matter simulate/gravitation simulate/contact/points simulate/contact/pairs simulate/contact simulate/followers simulate/effects simulate/thermal simulate/paper simulate/joints simulate/indent simulate/events simulate/scene
 simulate/equilibrium simulate/estimate simulate/probes simulate/quadratic/cells simulate/quadratic simulate/conduction simulate/live simulate/stepping simulate/implicit simulate/time simulate/modes simulate
 mapping/types mapping/anchors mapping/checks mapping/methods mapping/space mapping/crack mapping/report mapping/refine mapping
 cad/read cad/fit cad/deform cad

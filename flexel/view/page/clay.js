@@ -40,13 +40,14 @@ export class Clay {
   makeControls() {
     const {about} = this, on = (id, event, act) => this.by(id).addEventListener(event, () => act(this.by(id)));
     for (const each of document.querySelectorAll("input[name=hand]"))
-      each.addEventListener("change", () => { this.mode = each.value; });
+      each.addEventListener("change", () => this.choose(each.value));
     const faces = this.by("face");
     this.faceNames = [...new Set(this.shape.face)].sort((a, b) => a - b).map(face => this.panel.faceName(face)).filter(name => !name.odd);
     this.partOfFace = new Map([...new Set(this.shape.face)].map(face => [this.panel.faceName(face).text, this.panel.partName(face)]));
     for (const name of this.faceNames) element("option", {value: name.text, textContent: name.text}, faces);
     on("face-hold", "click", () => this.toggleHold(faces.value));
     on("face-pull", "click", () => this.post("grab face " + faces.value));
+    for (const kind of ["ball", "plate"]) on(`face-push-${kind}`, "click", () => this.push(kind, this.facePlaces.get(faces.value)));
     on("face-paint", "click", () => this.paint(this.partOfFace.get(faces.value)));
     on("stay", "click", () => this.post("release"));
     on("keep", "click", () => this.post("keep"));
@@ -88,6 +89,14 @@ export class Clay {
   length(id) { return (Number(this.by(id).value) || 0) * this.unit.factor; }
   triple(ids) { return ["x", "y", "z"].map(axis => this.length(ids + axis)); }
 
+  // A tool that pushes goes into the face unless something else is asked for.
+  choose(mode) {
+    const pushes = name => name.startsWith("push-"), along = this.by("along");
+    if (pushes(mode) && along.value === "any") along.value = "in";
+    if (!pushes(mode) && along.value === "in") along.value = "any";
+    this.mode = mode;
+  }
+
   leadExactly() { this.post(`0 ${this.triple("lead-").join(" ")}`, "stay"); }
 
   // By keys a place is given in numbers; that of the chosen face to begin with.
@@ -103,6 +112,12 @@ export class Clay {
   change(act, rest) {
     const ball = `${act} at ${rest.join(" ")} ${this.radius}`;
     this.post(act === "glue" ? `${ball} ${Math.max(1e-9, this.length("within"))}` : ball);
+  }
+
+  // Puts a ball or a plate where it touches a place as it is now.
+  push(kind, at) {
+    const {centre} = this.shape, place = this.panel.placeOf(at).toArray().map((x, k) => x + centre[k]);
+    this.post(`push ${kind} ${place.join(" ")} ${this.panel.normalOf(at).toArray().join(" ")} ${this.radius}`);
   }
 
   // Blanks in a material's name do not matter, and divide the words of an act.
@@ -179,12 +194,13 @@ export class Clay {
     if (this.mode === "hold") return name.odd ? this.say(`${name.text} is no face that has a name`, "warning") : this.toggleHold(name.text);
     if (this.mode === "paint") return this.paint(this.panel.partName(this.shape.face[hit.triangle]));
     if (this.mode === "carve" || this.mode === "glue") return this.change(this.mode, rest);
-    const byFace = this.by("takes").value === "face";
+    const pushes = this.mode.startsWith("push-") && this.mode.slice(5), byFace = !pushes && this.by("takes").value === "face";
     if (byFace && name.odd) return this.say(`${name.text} is no face that has a name`, "warning");
     this.picture.canvas.setPointerCapture(event.pointerId);
     this.drag = {from: at, now: at, pointer: event.pointerId, mode: this.mode, grabs: this.frame.grabs, axes: this.picture.view.axes,
                  touch: event.pointerType === "touch", pen: event.pointerType === "pen", pressure: event.pressure, into: this.panel.normalOf(hit).negate()};
-    this.post(byFace ? `grab face ${name.text}` : `grab at ${rest.join(" ")} ${this.radius}`);
+    if (pushes) this.push(pushes, hit);
+    else this.post(byFace ? `grab face ${name.text}` : `grab at ${rest.join(" ")} ${this.radius}`);
   }
 
   move(event) {
@@ -214,7 +230,8 @@ export class Clay {
     } else {
       const way = right.clone().multiplyScalar(x / metre).addScaledVector(up, -y / metre);
       const along = this.by("along").value;
-      if (along !== "any") this.keepAlong(way, along, right, up);
+      if (along === "in") this.keepAlong(way, drag.into, right, up, y / metre);
+      else if (along !== "any") this.keepAlong(way, new THREE.Vector3(...["x", "y", "z"].map(axis => axis === along ? 1 : 0)), right, up, 0);
       if (drag.pen) way.addScaledVector(drag.into, drag.pressure * this.radius);
       [way.x, way.y, way.z].forEach((value, k) => { pose[k] += value; });
     }
@@ -224,12 +241,11 @@ export class Clay {
     this.post("stay");
   }
 
-  // A way in the picture becomes one along an axis that looks the same there.
-  keepAlong(way, axis, right, up) {
-    const direction = new THREE.Vector3(...["x", "y", "z"].map(each => each === axis ? 1 : 0));
+  // A way in the picture becomes one along a direction that looks the same there; `unseen`: how long where that is along the eye.
+  keepAlong(way, direction, right, up, unseen) {
     const [a, b] = [direction.dot(right), direction.dot(up)], seen = a * a + b * b;
-    const length = seen < 0.01 ? 0 : (way.dot(right) * a + way.dot(up) * b) / seen;
-    way.copy(direction.multiplyScalar(length));
+    const length = seen < 0.01 ? unseen : (way.dot(right) * a + way.dot(up) * b) / seen;
+    way.copy(direction).multiplyScalar(length);
   }
 
   // --- frames ---
@@ -413,11 +429,26 @@ export class Clay {
       const middle = frame.middles[t], [x, y] = this.worldPoint(middle.map((m, k) => m + frame.place[t][k]));
       const leads = t === frame.tools.length - 1 && frame.hand;
       context.beginPath();
-      context.arc(x, y, 0.5 * em, 0, 2 * Math.PI);
+      if (frame.shapes[t]) this.outline(context, t, x, y);
+      else context.arc(x, y, 0.5 * em, 0, 2 * Math.PI);
       context.stroke();
       this.label(context, theme, this.forceText(t), x + 0.8 * em, y - 0.8 * em);
       if (leads) this.drawSpring(context, [x, y], this.worldPoint(middle.map((m, k) => m + frame.hand[k])), em);
     });
+  }
+
+  // Of a ball, or of a plate's face as it is turned.
+  outline(context, t, x, y) {
+    const {kind, radius, normal} = this.frame.shapes[t], place = this.frame.place[t];
+    if (kind === "ball") return context.arc(x, y, radius * this.picture.pixelsPerMetre(this.panel, this.picture.layout[0]), 0, 2 * Math.PI);
+    const turn = new THREE.Vector3(...place.slice(3)), angle = turn.length();
+    const face = new THREE.Vector3(...normal);
+    if (angle > 0) face.applyAxisAngle(turn.normalize(), angle);
+    const side = new THREE.Vector3(...(Math.abs(face.x) < 0.5 ? [1, 0, 0] : [0, 1, 0])).cross(face).normalize(), other = face.clone().cross(side);
+    for (let k = 0; k <= 32; ++k) {
+      const [c, s] = [Math.cos(k * Math.PI / 16), Math.sin(k * Math.PI / 16)];
+      context.lineTo(...this.worldPoint(this.frame.middles[t].map((m, i) => m + place[i] + radius * (c * side.getComponent(i) + s * other.getComponent(i)))));
+    }
   }
 
   // In a box, for the part below may have any colour.
