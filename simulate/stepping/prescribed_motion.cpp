@@ -23,6 +23,13 @@ PrescribedMotion::PrescribedMotion(const Constraints& constraints, const Body& b
 
 double PrescribedMotion::path(std::uint32_t element, int axis, const State& state) const {
   const std::uint32_t motion = constraints_.motion[element][static_cast<std::size_t>(axis)];
+  const auto at = [&](double time) {
+    State then;
+    then.time = time;
+    then.share = state.share;
+    return constraints_.path(body_, element, axis, constraints_.courses[motion].at(then));
+  };
+  if (state.time && *state.time > end_) return 2 * at(end_) - at(2 * end_ - *state.time);
   return constraints_.path(body_, element, axis, constraints_.courses[motion].at(state));
 }
 

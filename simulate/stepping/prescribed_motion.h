@@ -1,6 +1,7 @@
 // Elements that follow a path exactly in a timed run: after each free advance they are put where the path
 // wants them, and what that took is their support's force.
 #pragma once
+#include <limits>
 #include <vector>
 
 #include "simulate/conditions/constraints.h"
@@ -37,6 +38,9 @@ class PrescribedMotion {
   // Between two steps: puts them there.
   void put_on_path(State& state);
 
+  // From the time `end` [s] on, where the run is over, paths go on as they came there.
+  void go_on_beyond(double end) { end_ = end; }
+
   [[nodiscard]] const Body& body() const { return body_; }
 
  private:
@@ -50,6 +54,7 @@ class PrescribedMotion {
   const Constraints& constraints_;
   const Body& body_;
   std::vector<Entry> entries_;  // ascending by element
+  double end_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace flexel::simulate

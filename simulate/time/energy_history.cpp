@@ -179,10 +179,9 @@ void EnergyHistory::after(const State& state, const StepOutcome& outcome, const 
   if (fracture_) balance_.accounts[*fracture_].energy -= outcome.released;
   if (outcome.elastic) elastic_ += *outcome.elastic;
   if (sample_) add_row(state, supports, half_kick);
-  if (closing_)
-    balance_.accounts = kept;
-  else
-    add_powers(state.velocity, 0.5 * step, true);
+  if (!closing_) return add_powers(state.velocity, 0.5 * step, true);
+  for (std::size_t a = 0; a < kept.size(); ++a)  // what an event gave is of the row
+    if (kept[a].name != "events") balance_.accounts[a] = kept[a];
 }
 
 void EnergyHistory::add_row_of(const State& state, const std::vector<Vec3>& supports) {

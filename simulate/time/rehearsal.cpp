@@ -56,13 +56,6 @@ void rehearse_resolution(const Body& body, const Scene& scene, bool live) {
   if (live)
     throw InputError(first->origin,
                      "resolution changes in no run that is led or watched live: leave one out");
-  // The forces of a lattice show in its first step.
-  constexpr double kRunsEnd = 1e-12;  // share of a time
-  for (const Event& event : scene.events)
-    if (scene.run.time && event.at >= *scene.run.time * (1 - kRunsEnd))
-      throw InputError(event.origin,
-                       "resolution changes before the end of a run, which tells forces of steps on its last "
-                       "lattice: give an earlier \"at\"");
   Body copy = body;
   look_for_what_it_names(copy, scene, first->origin);
   Progress quiet("flexel", Progress::Mode::quiet);

@@ -88,6 +88,7 @@ TimeSegment::TimeSegment(Body& body, const Scene& scene, const SimulateOptions& 
   stepper_.emplace(problem_, plan_, book, options.isa);
   stepper_->read_memory(body.cell_columns);
   held_.emplace(constraints_, body_, state_, fresh);
+  held_->go_on_beyond(*scene.run.time);  // steps that are taken back
   if (!by_steps) staged_.emplace(*stepper_, *held_, book);
   make_forces();
   if (implicit)
@@ -467,18 +468,36 @@ void TimeSegment::kick(double time) {
   if (joined_) joined_->restore(joined);
 }
 
-void TimeSegment::close_books(const Clock& clock, EnergyHistory& history) {
-  if (euler_) return history.add_row_of(state_, euler_->supports());
-  const StopWaits whole;  // the step beyond is taken back
-  State last = state_;
+// `tell` hears of the present state while what acts is as the step left it.
+void TimeSegment::step_and_take_back(const Clock& clock, EnergyHistory* history,
+                                     const std::function<void(const State&)>& tell) {
+  const StopWaits whole;
+  const State last = state_;
   const Memory before = memory();
   const std::vector<std::uint8_t> broken = body_.broken;
   Clock beyond = clock;
-  history.close();
-  step(beyond, &history, true);
-  state_ = std::move(last);
+  step(beyond, history, history != nullptr);
+  tell(last);
+  state_ = last;
   body_.broken = broken;
   restore(before);
+}
+
+void TimeSegment::close_books(const Clock& clock, EnergyHistory& history) {
+  if (euler_) return history.add_row_of(state_, euler_->supports());
+  history.close();
+  step_and_take_back(clock, &history, [](const State&) {});
+}
+
+void TimeSegment::tell_forces_ahead(const Clock& clock, EnergyHistory* history, SimulateResult& result) {
+  if (history && !euler_) history->close();
+  if (history && euler_) history->before(state_, false);  // energy that was transferred until now
+  step_and_take_back(clock, euler_ ? nullptr : history, [&](const State& last) {
+    tell_forces(result, last);
+    if (!history || !euler_) return;
+    for (const ActiveEffect& effect : effects_) (void)effect->take_transfers(state_);  // that of the step
+    history->add_row_of(last, euler_->supports());
+  });
 }
 
 bool TimeSegment::damps_connections() const {

@@ -89,7 +89,7 @@ class TimeSegment {
   // Between two steps.
   void change_velocities(const std::function<void(State&)>& change);
   // Loads and reactions, as of the last step.
-  void tell_forces(SimulateResult& result) const;
+  void tell_forces(SimulateResult& result) const { tell_forces(result, state_); }
   // Whether kick() can: velocities are those of half steps, and nothing but forces changes them.
   [[nodiscard]] bool kicks() const;
   // The velocities change by the forces of the present state for so many seconds, before or after it.
@@ -97,6 +97,9 @@ class TimeSegment {
 
   // The books of the present state need the forces there, hence a step that is thrown away.
   void close_books(const Clock& clock, EnergyHistory& history);
+  // Where no step has led to the present state since an event: likewise what tell_forces() tells, and with `history`
+  // the books. Throws DivergedError.
+  void tell_forces_ahead(const Clock& clock, EnergyHistory* history, SimulateResult& result);
 
   // Says what the steps to clock.until do, and the events of the run.
   void explain(const Clock& clock) const;
@@ -111,8 +114,7 @@ class TimeSegment {
   // Adds the time of everything that acted, and the iterations, to `result`; once. `explained`: the time of
   // the effects in the hot loop apart from that of the model, which takes some steps more to tell.
   void add_effort(SimulateResult& result, bool explained);
-  // What can be measured now, with the stresses where they are asked for. `unbalanced` forces are those of
-  // the last step.
+  // What can be measured now but forces, with the stresses where they are asked for.
   void report(const Clock& clock, bool stress, SimulateResult& result);
 
   [[nodiscard]] const State& state() const { return state_; }
@@ -140,6 +142,9 @@ class TimeSegment {
   void refuse_held_rigid() const;
   void step_implicitly(Clock& clock, EnergyHistory* history, bool row);
   void enter_implicit_step(EnergyHistory& history);
+  void tell_forces(SimulateResult& result, const State& state) const;
+  void step_and_take_back(const Clock& clock, EnergyHistory* history,
+                          const std::function<void(const State&)>& tell);
   void look();
   void tell_loop_apart();
   template <class Add>

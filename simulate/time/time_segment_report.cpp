@@ -9,15 +9,14 @@
 
 namespace flexel::simulate {
 
-void TimeSegment::tell_forces(SimulateResult& result) const {
+void TimeSegment::tell_forces(SimulateResult& result, const State& state) const {
   std::vector<Vec3> unbalanced(body_.element_count(), Vec3::Zero());
   held_->add_forces(unbalanced);
   for (Vec3& force : unbalanced) force = -force;
-  for (const ActiveEffect& effect : effects_) effect->report(state_, unbalanced, result);
+  for (const ActiveEffect& effect : effects_) effect->report(state, unbalanced, result);
 }
 
 void TimeSegment::report(const Clock& clock, bool stress, SimulateResult& result) {
-  tell_forces(result);
   for (const ProbePoints& probe : probes_)
     if (!probe.is_to_come()) result.probes.push_back(measure(probe, state_));
   const Stencil none;

@@ -67,6 +67,7 @@ class TimedRun {
   void play();
   void play_until(double end, bool resumed);
   void enter_half_step();
+  void look_beyond_end();
   void apply(std::size_t end);
   void bond_joined(std::size_t first, const State& state);
   void keep_motion(const CarriedMotion& carried, const Event& event);
@@ -357,6 +358,17 @@ void TimedRun::play_until(double end, bool resumed) {
       ->refuse_unsound();  // a step looks at the state that it begins with: nothing has looked at the last
 }
 
+// No step follows the last event: forces and books of the end are those of one that is taken back.
+void TimedRun::look_beyond_end() {
+  const bool whole_step = at_whole_step_;
+  const std::vector<Vec3> velocity = segment_->state().velocity;
+  clock_.until = 2 * duration_;
+  segment_->choose_step(clock_);
+  if (whole_step) enter_half_step();
+  segment_->tell_forces_ahead(clock_, history_.get(), result_);
+  if (whole_step) segment_->change_velocities([&](State& state) { state.velocity = velocity; });
+}
+
 // Saves what a run that is stopped leaves; says where it is.
 std::string TimedRun::stop() {
   const StopWaits saving;
@@ -466,16 +478,14 @@ void TimedRun::play() {
     apply(end);
   }
   const std::uint64_t before = clock_.steps;
-  const bool just_changed = events_ > 0 && !resumed;
   play_until(duration_, resumed);
-  if (just_changed && clock_.steps == before && !over())
-    progress_.warn(
-        "an [[event]] happens at the very end of the run and no step follows it: forces and the energy "
-        "balance of the end are not to be trusted; let [run] time be longer");
+  const bool steps = clock_.steps > before || over();
   if (relaxation_ && !relaxation_->done())
     throw DivergedError(relaxation_->failure(body_, segment_->state()));
   if (live_) live_summary_ = live_->finish(segment_->state());
+  if (!steps) return look_beyond_end();
   if (history_) segment_->close_books(clock_, *history_);
+  segment_->tell_forces(result_);
 }
 
 // The body at the last state, the books written, and what is told of the run.

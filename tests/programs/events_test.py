@@ -48,12 +48,20 @@ def test_a_renormalised_body_keeps_its_shape():
     expect(abs(longest(map_of["sprung"]) - longest(map_of["rest"])) > 0.01, "what was not frozen should spring back")
 
 
-def test_an_event_at_the_very_end_is_told():
+def test_an_event_at_the_very_end_has_forces():
+    """As those of a run that goes on for one step, with books and without."""
     body()
-    for at, told in (("2 ms", True), ("1.9 ms", False)):
-        scene(text=FREE + f'[[event]]\nat = "{at}"\ndo = "edit"\nstiffness = 2.0\n')
-        result = expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu"))
-        expect(("at the very end of the run" in result.err) == told, f"{at}: {result}")
+    for do in ('do = "edit"\nstiffness = 3.0\n', 'do = "renormalise"\n', CARVE.split("\n", 2)[2].format("19 mm")):
+        force = []
+        for time, more in (("2 ms", ()), ("2 ms", ("--history", "h.csv")), ("2.002 ms", ())):
+            scene(text=FREE.replace('"2 ms"', f'"{time}"\nstep = "2 us"') + '[[fix]]\nwhere = "xmin"\n[gravity]\nacceleration = [0, 0, "-9.81 m/s2"]\n'
+                  '[[velocity]]\nwhere = { half_space = { point = ["15 mm", 0, 0], normal = [1, 0, 0] } }\nvelocity = ["1 m/s", 0, 0]\n'
+                  f'[[event]]\nat = "2 ms"\n{do}')
+            force.append(summary("scene.toml", "body.vtu", "-o", "out.vtu", "--force", *more)["reactions"][0]["force"])
+        size = max(map(abs, force[2]))
+        expect(size > 0.01, f"{do}: the support bears {force[2]} N")
+        for found in force[:2]:
+            expect(max(abs(a - b) for a, b in zip(found, force[2])) < 1e-6 * size, f"{do}: {found} N, and {force[2]} N a step later")
 
 
 def test_carving_half_takes_half_the_mass():

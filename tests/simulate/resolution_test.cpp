@@ -360,7 +360,6 @@ TEST(Resolution, Refuses) {
   EXPECT_THAT(refused(finer, "[parts.bar]\nrigid = true\n"), ::testing::HasSubstr("rigid"));
   EXPECT_THAT(refused(fmt::format("{}[[event]]\nat = \"1 ms\"\ndo = \"renormalise\"\n", finer)),
               ::testing::HasSubstr("renormalise"));
-  EXPECT_THAT(refused(change_at("2 ms", "\"finer\"")), ::testing::HasSubstr("before the end"));
   EXPECT_THAT(refused(change_at("0 s", "\"coarser\"") + change_at("1 ms", "\"coarser\"")),
               ::testing::HasSubstr("2 x 2 x 2"));
 }
