@@ -22,6 +22,8 @@ def array(lmp, name, count, kind, columns):
   return np.ctypeslib.as_array((kind * (columns * count)).from_address(start)).reshape(count, columns)
 
 def all_bonds(lmp):
+  if library.lammps_extract_setting(lmp, b"tagint") != 4:
+    raise RuntimeError("[damping] needs LAMMPS with numbers of atoms of 32 bits, not one built with -DLAMMPS_BIGBIG")
   count = ctypes.c_int64.from_address(library.lammps_extract_global(lmp, b"nbonds")).value
   found = np.zeros((count, 3), np.int32)
   library.lammps_gather_bonds(lmp, found.ctypes.data_as(ctypes.c_void_p))
