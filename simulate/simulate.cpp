@@ -252,6 +252,13 @@ void Run::warn_of_buckling(Mechanics& mechanics) {
                       : "whether this equilibrium is stable was not found out: the part may buckle"));
 }
 
+void count_work(const EquilibriumResult& solved, SimulateResult& result) {
+  result.load_steps = solved.load_steps;
+  result.newton_iterations = solved.newton_iterations;
+  result.cg_iterations = solved.cg_iterations;
+  result.relative_residual = solved.relative_residual;
+}
+
 SimulateResult Run::operator()() {
   SimulateResult result;
   report_materials(problem_, progress_);
@@ -299,12 +306,9 @@ SimulateResult Run::operator()() {
   measure_displacement(body_, state_, result);
   result.mass = mass_of(problem_);
   refuse_not_finite(result, scene_.name);
+  count_work(solved, result);
   result.unknowns = count_unknowns(mechanics.constraints(), body_.element_count());
-  result.load_steps = solved.load_steps;
-  result.newton_iterations = solved.newton_iterations;
-  result.cg_iterations = solved.cg_iterations;
   result.start_newton_iterations = start_newton_iterations_;
-  result.relative_residual = solved.relative_residual;
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
   if (options_.explain) {
     std::vector<EffectShare> shares = result.shares;

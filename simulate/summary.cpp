@@ -327,6 +327,21 @@ Json strength_json(const SimulateResult& result, const Body& body, const std::ve
   return json;
 }
 
+void add_stress(const SimulateResult& result, const Body& body, const std::vector<Material>& materials,
+                Json& json) {
+  json["largest_von_mises"] = result.stress->value;
+  json["largest_von_mises_at"] = vector(result.stress->at);
+  json["largest_von_mises_part"] = result.stress->part;
+  if (!result.stress->beside.empty()) json["largest_von_mises_beside"] = result.stress->beside;
+  if (result.stress->thin_walls > 0) json["largest_von_mises_thin_walls"] = result.stress->thin_walls;
+  if (result.stress->yield_share) json["largest_von_mises_yield_share"] = *result.stress->yield_share;
+  if (const std::optional<double> bar = yield_share_bar(result))
+    json["largest_von_mises_yield_share_bar"] = *bar;
+  if (result.local_stress) json["largest_von_mises_local"] = local_stress_json(*result.local_stress);
+  if (!result.no_local_stress.empty()) json["largest_von_mises_local_none"] = result.no_local_stress;
+  json["strength"] = strength_json(result, body, materials);
+}
+
 }  // namespace
 
 std::string summary_json(const SimulateResult& result, const Body& body,
@@ -369,19 +384,7 @@ std::string summary_json(const SimulateResult& result, const Body& body,
     json["smallest_corner_jacobian"] = *result.smallest_corner_jacobian;
     json["smallest_corner_at"] = vector(result.smallest_corner_at);
   }
-  if (result.stress) {
-    json["largest_von_mises"] = result.stress->value;
-    json["largest_von_mises_at"] = vector(result.stress->at);
-    json["largest_von_mises_part"] = result.stress->part;
-    if (!result.stress->beside.empty()) json["largest_von_mises_beside"] = result.stress->beside;
-    if (result.stress->thin_walls > 0) json["largest_von_mises_thin_walls"] = result.stress->thin_walls;
-    if (result.stress->yield_share) json["largest_von_mises_yield_share"] = *result.stress->yield_share;
-    if (const std::optional<double> bar = yield_share_bar(result))
-      json["largest_von_mises_yield_share_bar"] = *bar;
-    if (result.local_stress) json["largest_von_mises_local"] = local_stress_json(*result.local_stress);
-    if (!result.no_local_stress.empty()) json["largest_von_mises_local_none"] = result.no_local_stress;
-    json["strength"] = strength_json(result, body, materials);
-  }
+  if (result.stress) add_stress(result, body, materials, json);
   if (result.modes) json["shapes"] = modes_json(*result.modes);
   json.update(run_json(result));
   json["seconds"] = result.seconds;
