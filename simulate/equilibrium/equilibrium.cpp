@@ -72,6 +72,13 @@ int least_load_steps(const Mechanics& mechanics) {
   return static_cast<int>(std::ceil(steps - 1e-9));
 }
 
+std::vector<RigidLink> links_now(const Constraints& constraints) {
+  std::vector<RigidLink> links;
+  for (const Motion& motion : constraints.motions)
+    if (motion.link) links.push_back(*motion.link);
+  return links;
+}
+
 void restore_followers(Mechanics& mechanics, const FollowerMemory& memory) {
   std::size_t next = 0;
   for (const ActiveEffect& effect : mechanics.effects())
@@ -99,6 +106,8 @@ class LoadStepping {
   void solve();
   // Tries the next share; true and moved on when it converged.
   bool attempt(NewtonSteps steps, int max_iterations);
+  // Where the part has gone through an indenter, what was found is none.
+  void refuse_gone_through(const std::vector<RigidLink>& links_before);
   [[nodiscard]] bool gives_up() const {
     return length_.get() <= kSmallestIncrement * first_ || iterations_left() <= 0;
   }
@@ -192,6 +201,7 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   if (pushed_) push(trial_);
   std::optional<ShareScope> preparing;
   if (reach_ == 0) preparing.emplace(progress_, kBeforeSearch, kBeforeFirstStep, "preparing");
+  const std::vector<RigidLink> links = links_now(mechanics_.constraints());
   double most_gone = 0;  // a residual may rise again
   outcome_ = newton_with_links(mechanics_, trial_, options, [&](double gone, const std::string& note) {
     check_stop();
@@ -204,6 +214,7 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   result_.newton_iterations += outcome_.iterations;
   result_.cg_iterations += outcome_.cg_iterations;
   result_.linear_seconds += outcome_.linear_seconds;
+  refuse_gone_through(links);
   least_residual_ = outcome_.converged ? 1 : std::min(least_residual_, outcome_.relative_residual);
   if (!outcome_.converged) return false;
   done_ = trial_.share;
@@ -214,6 +225,19 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   result_.relative_residual = outcome_.relative_residual;
   length_.succeeded(outcome_.iterations <= kEasyIterations);
   return true;
+}
+
+void LoadStepping::refuse_gone_through(const std::vector<RigidLink>& links_before) {
+  const Indenters* indenters = find_indenters(mechanics_.effects());
+  if (!outcome_.converged || !indenters) return;
+  const std::string name = indenters->gone_through(indenters->places(done_), state_.displacement, trial_);
+  if (name.empty()) return;
+  outcome_.converged = false;
+  outcome_.relative_residual = 1;
+  outcome_.trouble = fmt::format("the part goes through indenter \"{}\"", name);
+  auto link = links_before.begin();
+  for (const Motion& motion : mechanics_.constraints().motions)
+    if (motion.link) *motion.link = *link++;
 }
 
 // What a torque does that goes on turning what it acts on, at a state in equilibrium; "" where none turns it

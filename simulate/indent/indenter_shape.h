@@ -3,6 +3,8 @@
 // Both are what lies within `rounding` of a convex core: the centre of the ball; the rod without its outermost layer. So
 // the distance to them is smooth outside the core.
 #pragma once
+#include <array>
+
 #include "base/math/vec.h"
 
 namespace flexel::simulate {
@@ -31,5 +33,11 @@ struct IndenterGap {
 };
 
 [[nodiscard]] IndenterGap gap_to(const IndenterShape& shape, const IndenterPlace& place, const Vec3& point);
+
+// Whether a point that goes straight from one place to another is deep inside on the way, by a third of the rounding (a
+// quarter may do), while the indenter goes as straight: then it may have come out on the other side. Both ends are all but
+// outside.
+[[nodiscard]] bool goes_through(const IndenterShape& shape, const std::array<IndenterPlace, 2>& places,
+                                const std::array<Vec3, 2>& point);
 
 }  // namespace flexel::simulate

@@ -117,6 +117,17 @@ void refuse_unfit(const Indenter& indenter, const Problem& problem) {
   if (const double spacing = smallest_spacing(problem.body); indenter.shape.radius < spacing)
     refuse(fmt::format("has a radius of {}, less than a cell of {}: use a smaller spacing (--size)",
                        human_length(indenter.shape.radius), human_length(spacing)));
+  // Deeper than its rounding a plate pushes along its normal all at once, and a solution is a hundredth of a cell deep.
+  constexpr double kLeastRounding = 0.1;  // cells
+  if (const double least = kLeastRounding * smallest_spacing(problem.body); indenter.shape.rounding < least)
+    refuse(fmt::format("has an edge of radius {}, less than a tenth of a cell, {}: use a larger \"rounding\"",
+                       human_length(indenter.shape.rounding), human_length(least)));
+  constexpr double kMostSteps = 10000;
+  if (const double steps = indenter.way() / (kIndenterStep * indenter.shape.rounding); !(steps <= kMostSteps))
+    refuse(fmt::format(
+        "is led by {}, which at {} a load step takes more than {} of them: check the unit, or begin nearer",
+        human_length(indenter.way()), human_length(kIndenterStep * indenter.shape.rounding),
+        human_count(static_cast<std::size_t>(kMostSteps))));
 }
 
 // Where nothing has moved yet: no point deeper than a solution has it, and no ball within a part, where all of the surface
@@ -308,6 +319,31 @@ double Indenters::longest_share() const {
     if (const double way = indenter.way(); !indenter.motion.link && way > 0)
       longest = std::min(longest, kIndenterStep * indenter.shape.rounding / way);
   return longest;
+}
+
+std::vector<IndenterPlace> Indenters::places(double share) const {
+  std::vector<IndenterPlace> places;
+  for (const Indenter& indenter : indenters_) places.push_back(indenter.at(share));
+  return places;
+}
+
+std::string Indenters::gone_through(const std::vector<IndenterPlace>& before,
+                                    const std::vector<Vec3>& displacement, const State& state) const {
+  for (std::size_t i = 0; i < indenters_.size(); ++i) {
+    const std::array<IndenterPlace, 2> places{before[i], indenters_[i].at(state.share)};
+    for (const Patch& patch : patches_) {
+      const std::array<Vec3, 8> from = corners(patch, displacement), to = corners(patch, state.displacement);
+      for (std::uint32_t q = patch.begin; q < patch.end; ++q) {
+        std::array<Vec3, 2> point{Vec3::Zero(), Vec3::Zero()};
+        for (std::size_t a = 0; a < 8; ++a) {
+          point[0] += points_[q].weights[a] * from[a];
+          point[1] += points_[q].weights[a] * to[a];
+        }
+        if (goes_through(indenters_[i].shape, places, point)) return indenters_[i].name;
+      }
+    }
+  }
+  return "";
 }
 
 std::vector<double> Indenters::depths(const State& state) const {

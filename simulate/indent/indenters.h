@@ -8,7 +8,8 @@
 // touch. A multiplier (augmented Lagrangian) would let nothing in, and have no energy by which the steps are judged.
 //
 // A point of the surface does not know which side it came from: where the indenter goes further in one go than its
-// rounding, it may come out on the other. So no load step leads it by more than half of that (longest_share()).
+// rounding, it may come out on the other. So no load step leads it by more than half of that (longest_share()), and one
+// in which the part itself goes through (gone_through()) is taken in shorter ones.
 #pragma once
 #include "simulate/conditions/motion.h"
 #include "simulate/effects/effect.h"
@@ -45,8 +46,8 @@ class Indenters : public Effect {
   static constexpr double kDeepest = 0.01;  // cells, that the surface is inside
 
   static void parse(TableReader& scene, Parameters& parameters);
-  // Throws InputError: a timed run, a model without cells, a body that was carved, a ball smaller than a cell, an indenter
-  // that begins inside a part.
+  // Throws InputError: a timed run, a model without cells, a body that was carved, a radius under a cell, an edge that is too
+  // sharp, a way that takes too many load steps, an indenter that begins inside a part.
   [[nodiscard]] static std::optional<Indenters> make(const Parameters& parameters, const Problem& problem);
   [[nodiscard]] std::string why() const override;
 
@@ -63,6 +64,11 @@ class Indenters : public Effect {
   [[nodiscard]] double longest_share() const;
   // Cells, that the surface is inside at most, of each.
   [[nodiscard]] std::vector<double> depths(const State& state) const;
+  [[nodiscard]] std::vector<IndenterPlace> places(double share) const;
+  // The name of one that the surface has gone through on its straight way to `state` from another, where the indenters
+  // were at these places; empty: of none.
+  [[nodiscard]] std::string gone_through(const std::vector<IndenterPlace>& before,
+                                         const std::vector<Vec3>& displacement, const State& state) const;
   // For people: what touches nothing, what is deeper than kDeepest.
   [[nodiscard]] std::vector<std::string> warnings(const State& state) const;
   void report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) override;

@@ -24,7 +24,7 @@ struct Reaction {  // of one [[fix]] or [[move]]
   Vec3 force = Vec3::Zero();   // N, by the support on the body
   Vec3 moment = Vec3::Zero();  // N m, about the world's origin, where the body is now
   Vec3 middle = Vec3::Zero();  // m: the mean place, now, of what is held
-  bool is_move = false;        // of a [[move]]
+  bool is_move = false;        // of a [[move]] or an [[indenter]]
   [[nodiscard]] Vec3 moment_about_middle() const { return moment - middle.cross(force); }
 };
 

@@ -120,6 +120,33 @@ TEST_P(ShapeOf, TheGapIsADistanceWithItsDerivatives) {
   EXPECT_GT(outside, 100);
 }
 
+// Beside points close together on the way, of paths that begin and end outside. (Its own are half of that depth apart.)
+TEST_P(ShapeOf, WhatGoesThroughIsDeepOnTheWay) {
+  const IndenterShape shape = GetParam();
+  const std::vector<Vec3> any = any_vectors(4000, 0.02);
+  const double deep = 0.25 * shape.rounding, near = 1e-2 * deep;
+  int through = 0, past = 0;
+  for (std::size_t i = 0; i + 3 < any.size(); i += 4) {
+    const std::array<IndenterPlace, 2> places{
+        IndenterPlace{any[i], Vec3::UnitZ()},
+        IndenterPlace{any[i] + 0.2 * any[i + 1], Vec3(0.2, 0, 1).normalized()}};
+    const std::array<Vec3, 2> point{any[i] + any[i + 2], any[i] + any[i + 3]};
+    const auto gap = [&](double gone) {
+      const IndenterPlace now{(1 - gone) * places[0].centre + gone * places[1].centre,
+                              ((1 - gone) * places[0].normal + gone * places[1].normal).normalized()};
+      return gap_to(shape, now, (1 - gone) * point[0] + gone * point[1]).distance;
+    };
+    if (gap(0) < 0 || gap(1) < 0) continue;
+    double least = 1;
+    for (int step = 0; step <= 1000; ++step) least = std::min(least, gap(step / 1000.0));
+    if (least > -1.3 * deep && least < near - deep) continue;  // it grazes
+    EXPECT_EQ(goes_through(shape, places, point), least < -deep) << least;
+    ++(least < -deep ? through : past);
+  }
+  EXPECT_GT(through, 10);
+  EXPECT_GT(past, 10);
+}
+
 INSTANTIATE_TEST_SUITE_P(Indenters, ShapeOf,
                          ::testing::Values(IndenterShape{false, 0.008, 0.008},
                                            IndenterShape{true, 0.012, 0.004},
@@ -294,6 +321,37 @@ TEST(Indenters, ABallDoesNotPassThroughAPart) {
   }
 }
 
+// So does one at rest that the part is led onto, by more than its diameter: it pushes as where the part comes little by
+// little.
+TEST(Indenters, APartDoesNotPassThroughABall) {
+  const std::string onto =
+      "[[fix]]\nwhere = \"box/x0\"\n[[move]]\nwhere = \"box/x1\"\ndisplacement = [0, 0, \"-30 mm\"]\n" +
+      ball(Vec3(0.04, 0.01, -0.008), 0.006, Vec3::Zero());
+  std::vector<double> pushed;
+  for (const std::string how : {"", "[run]\nload_steps = 40\n"}) {
+    Body body = box_body({.cells = {16, 4, 2}, .spacing = Vec3::Constant(0.005)});
+    pushed.push_back(solve(body, how + onto).reactions.back().force.z());
+  }
+  EXPECT_GT(pushed[1], 10);
+  EXPECT_NEAR(pushed[0], pushed[1], 1e-4 * pushed[1]);
+}
+
+// A load by a rigid link presses a bar against a ball as one that is spread evenly does, and nothing buckles.
+TEST(Indenters, ARigidLinkPressesAsALoadDoes) {
+  std::vector<double> pushed;
+  for (const std::string link : {"averaging", "rigid"}) {
+    Body body = box_body({.cells = {16, 4, 2}, .spacing = Vec3::Constant(0.005)});
+    pushed.push_back(solve(body,
+                           "[[fix]]\nwhere = \"box/x0\"\n[[load]]\nwhere = \"box/x1\"\nforce = [0, 0, "
+                           "\"0.1 N\"]\nlink = \"" +
+                               link + "\"\n" + ball(Vec3(0.06, 0.01, 0.017), 0.006, Vec3::Zero()))
+                         .reactions.back()
+                         .force.z());
+  }
+  EXPECT_LT(pushed[0], -0.05);
+  EXPECT_NEAR(pushed[1], pushed[0], 0.02 * std::abs(pushed[0]));
+}
+
 // Without friction a plate that is turned pushes along its face's normal.
 TEST(Indenters, APlateTurnsAndPushesAlongItsNormal) {
   Body body = box_body({.cells = {8, 8, 4}, .spacing = Vec3::Constant(0.005)});
@@ -347,6 +405,11 @@ TEST(Indenters, WhatCannotBeIsRefused) {
               HasSubstr("begins inside part \"box\""));
   EXPECT_THAT(why(kOnTheGround + ball(Vec3(0.02, 0.02, 0.026), 0.005, Vec3::Zero())),
               HasSubstr("less than a cell"));
+  EXPECT_THAT(why(kOnTheGround + ball(Vec3(0.02, 0.02, 0.032), 0.012, Vec3(0, 0, -1e10))),
+              HasSubstr("takes more than 10,000 of them"));
+  EXPECT_THAT(why(kOnTheGround + "[[indenter]]\nplate = { centre = [0, 0, \"30 mm\"], normal = [0, 0, -1], "
+                                 "radius = \"10 mm\", rounding = \"0.9 mm\" }\n"),
+              HasSubstr("less than a tenth of a cell"));
   EXPECT_THAT(why(good), HasSubstr("nothing holds part \"box\""));
   EXPECT_THAT(why("[[fix]]\nwhere = \"box/z0\"\naxes = \"xy\"\n" + good),
               HasSubstr("free to translate along z"));
