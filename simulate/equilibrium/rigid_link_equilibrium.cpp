@@ -16,6 +16,7 @@
 #include "base/error.h"
 #include "base/math/dense.h"
 #include "base/parallel.h"
+#include "simulate/indent/indenters.h"
 #include "simulate/linear/conjugate_gradients.h"
 #include "simulate/linear/multigrid.h"
 
@@ -220,6 +221,8 @@ NewtonOutcome Balance::settle(double from, double to) {
 
 // Moves the links until nothing is lacking. False when it did not get there.
 bool Balance::find() {
+  // Where a step of the links makes the body touch something, its slope is another.
+  const bool touches = find_indenters(mechanics_.effects()) != nullptr;
   LinkVector left = lacking(state_);
   Eigen::MatrixXd slope;
   bool serves = false;
@@ -243,7 +246,7 @@ bool Balance::find() {
     if (now.norm() <= kLooser * options_.tolerance * scale_) return true;
     outcome_.trouble =
         fmt::format("the rigid link \"{}\" lacks {:.1e} of its load", links_[0]->name, now.norm() / scale_);
-    if (!(now.norm() < kAstray * left.norm())) return false;
+    if (!touches && !(now.norm() < kAstray * left.norm())) return false;
     serves = now.norm() < kServes * left.norm();
     slope += (now - left - slope * step) * step.transpose() / step.squaredNorm();
     left = now;
