@@ -134,6 +134,21 @@ void refuse_more_tools(const ClayDocument& document) {
   if (document.tools.size() == kMostTools) throw InputError("16 tools are there: let one go first");
 }
 
+// A scene leads a tool straight from where it begins to where it is.
+void refuse_detour(const ClayDocument& document, const std::string& base) {
+  if (std::none_of(document.tools.begin(), document.tools.end(),
+                   [](const ClayTool& tool) { return tool.shape.has_value(); }))
+    return;
+  simulate::Scene scene = simulate::parse_scene(scene_text(document, base, false), "what acts on the part");
+  scene.events.clear();  // they have happened to the body
+  const std::string name = led_through(*document.now.body, scene, *document.displacement);
+  if (!name.empty())
+    throw InputError(
+        fmt::format("{} was led around the part, and a scene leads it straight, through the part: let it go, "
+                    "and put a tool where it is now",
+                    name));
+}
+
 bool is_motion(const Act& act) {
   return act.kind == Act::Kind::pose || act.kind == Act::Kind::hand;
 }
@@ -402,6 +417,7 @@ void ClaySession::alter(const Act& act, ClayDocument& next) const {
 
 void ClaySession::keep(ClayDocument& next) const {
   if (!model_) throw InputError("nothing acts on the part: hold a face before its shape is kept");
+  refuse_detour(next, base_);
   const std::vector<ToolPose> poses = model_->poses();
   if (!model_->lead(poses, kTolerance, kIterations, [] { check_stop(); }))
     throw InputError("the part is not at rest: its shape cannot be kept");
@@ -428,23 +444,26 @@ void ClaySession::take_up(ClayDocument next) {
     Progress silent("", Progress::Mode::silent);
     check_actions(scene, *next.now.body, silent);
     std::vector<LedTool> tools;
+    std::vector<ToolPose> led;
     int most = 1;  // steps from rest
     for (const ClayTool& tool : next.tools) {
       tools.push_back({tool.middle, tool.shape.has_value()});
+      led.push_back(tool.pose);
       most = std::max(most, tool.steps(tool.pose));
     }
     const double arm = 0.1 * bounding_box(next.now.body->rest).diagonal();
-    const auto found = [&](const std::vector<Vec3>& start, int steps) {
-      model = std::make_unique<PulledBody>(*next.now.body, scene, tools, arm, start);
+    const auto found = [&](const std::vector<Vec3>& start, const std::vector<ToolPose>& started, int steps) {
+      model = std::make_unique<PulledBody>(*next.now.body, scene, tools, arm, start, started);
       for (int step = 1; step <= steps; ++step) {
-        std::vector<ToolPose> poses;
-        for (const ClayTool& tool : next.tools)
-          poses.push_back(step == steps ? tool.pose : tool.pose * (double(step) / steps));
+        std::vector<ToolPose> poses = led;
+        if (step < steps)
+          for (ToolPose& pose : poses) pose = pose * (double(step) / steps);
         if (!model->lead(poses, kTolerance, kIterations, stop_asked())) return false;
       }
       return true;
     };
-    if (!found(*next.displacement, 1) && !found(*displacement_of(*next.now.body), most))
+    if (!found(*next.displacement, led, 1) &&
+        !found(*displacement_of(*next.now.body), std::vector<ToolPose>(led.size()), most))
       throw InputError("no equilibrium is found there");
     next.displacement = std::make_shared<const std::vector<Vec3>>(model->whole_displacement());
   } else {
@@ -644,6 +663,7 @@ Answer ClaySession::save(const std::string& name) {
       return {200, bytes_of(name == "rest.vtu" ? *first_ : bent(document))};
     for (const char* format : kFormats)
       if (name == std::string("part.") + format) return mapped(name, bent(document));
+    if (name.starts_with("scene")) refuse_detour(document, base_);
     if (name == "scene.tar") {
       std::vector<std::pair<std::string, std::string>> files = scenes_of(document, base_);
       files.emplace(files.begin(), "rest.vtu", bytes_of(*first_));

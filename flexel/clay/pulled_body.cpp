@@ -82,6 +82,18 @@ std::optional<std::array<double, 2>> ways_clear(const Body& body, const simulate
   return std::array{*first, *second};
 }
 
+std::string led_through(const Body& body, const simulate::Scene& scene, const std::vector<Vec3>& now) {
+  const simulate::Problem problem = problem_of(scene, body, simulate::find_fragments(body));
+  const std::optional<simulate::Indenters> indenters =
+      simulate::Indenters::make(scene.get<simulate::Indenters>(), problem);
+  if (!indenters) return "";
+  const std::vector<Vec3> rest =
+      problem.settled.empty() ? std::vector<Vec3>(now.size(), Vec3::Zero()) : problem.settled;
+  const std::vector<simulate::IndenterPlace> start = indenters->places(0);
+  const simulate::State end{now, 1};
+  return indenters->gone_through(start, now, end).empty() ? "" : indenters->gone_through(start, rest, end);
+}
+
 void refuse_unled(const simulate::Scene& scene, const Body& body, std::size_t pushers) {
   refuse_unled(scene, pushers);
   if (simulate::is_quadratic(scene, body))
@@ -91,13 +103,13 @@ void refuse_unled(const simulate::Scene& scene, const Body& body, std::size_t pu
 PulledBody::~PulledBody() = default;
 
 PulledBody::PulledBody(const Body& body, simulate::Scene scene, std::vector<LedTool> tools, double arm,
-                       std::vector<Vec3> start)
+                       std::vector<Vec3> start, std::vector<ToolPose> started)
     : body_(body),
       fragments_(simulate::find_fragments(body)),
       problem_((refuse_unled(scene, body, pushers_of(tools)), problem_of(scene, body, fragments_))),
       tools_(std::move(tools)),
       arm_(arm),
-      poses_(tools_.size()),
+      poses_(std::move(started)),
       felt_(tools_.size()) {
   std::vector<simulate::Tie>& ties = scene.get<simulate::Supports>().ties;
   std::vector<simulate::Indenter>& indenters = scene.get<simulate::Indenters>().indenters;
@@ -105,7 +117,6 @@ PulledBody::PulledBody(const Body& body, simulate::Scene scene, std::vector<LedT
   for (std::size_t t = 0; t < tools_.size(); ++t) {
     reaction_.push_back(tools_[t].pushes ? ties.size() + indenter : tie);
     simulate::Motion& motion = tools_[t].pushes ? indenters[indenter++].motion : ties[tie++].motion;
-    poses_[t] = {motion.translation, motion.angle * motion.axis};
     motion.link = links_.emplace_back(std::make_shared<simulate::RigidLink>());
     motion.link->middle = tools_[t].middle;
   }
@@ -130,6 +141,9 @@ bool PulledBody::lead(const std::vector<ToolPose>& poses, double tolerance, int 
 
 bool PulledBody::solve(const std::vector<ToolPose>& poses, double tolerance, int iterations, bool predicted,
                        const std::function<void()>& stop) {
+  const simulate::Indenters* indenters = simulate::find_indenters(mechanics_->effects());
+  const std::vector<simulate::IndenterPlace> places =
+      indenters ? indenters->places(state_.share) : std::vector<simulate::IndenterPlace>{};
   lead_ties(poses);
   simulate::State trial = state_;
   if (predicted && !answer_.empty()) {
@@ -159,7 +173,8 @@ bool PulledBody::solve(const std::vector<ToolPose>& poses, double tolerance, int
     options.max_iterations = std::max(iterations, kLoweringIterations);
     outcome = simulate::newton(*mechanics_, trial, options, asked, &memory_);
   }
-  if (!outcome.converged) {
+  if (!outcome.converged ||
+      (indenters && !indenters->gone_through(places, state_.displacement, trial).empty())) {
     memory_ = {};
     lead_ties(poses_);
     return false;

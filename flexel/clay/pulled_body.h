@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "flexel/clay/tool_pose.h"
@@ -27,6 +28,11 @@ void refuse_unled(const simulate::Scene& scene, const Body& body, std::size_t pu
                                                               const simulate::IndenterPlace& place,
                                                               const Vec3& away, const std::vector<Vec3>& now);
 
+// The name of an [[indenter]] of `scene` that is led through the part, both as it is moved by `now` and while it comes there
+// from the shape that `scene` finds; "": of none.
+[[nodiscard]] std::string led_through(const Body& body, const simulate::Scene& scene,
+                                      const std::vector<Vec3>& now);
+
 struct LedTool {
   Vec3 middle = Vec3::Zero();  // m, rest: it turns about this
   bool pushes = false;         // an [[indenter]], else a [[move]]
@@ -35,9 +41,10 @@ struct LedTool {
 class PulledBody {
  public:
   // `body` outlives it. The last [[move]] and [[indenter]] of `scene` are the tools, in their order; `arm` [m]: how large one is.
-  // Begins at `start` (elements) [m]. Throws InputError: as flexel-simulate would of the scene, and as refuse_unled does.
+  // Begins at `start` (elements) [m] with the tools at `started`. Throws InputError: as flexel-simulate would of the scene, and
+  // as refuse_unled does.
   PulledBody(const Body& body, simulate::Scene scene, std::vector<LedTool> tools, double arm,
-             std::vector<Vec3> start);
+             std::vector<Vec3> start, std::vector<ToolPose> started);
   PulledBody(const PulledBody&) = delete;
   PulledBody& operator=(const PulledBody&) = delete;
   ~PulledBody();

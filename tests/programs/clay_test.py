@@ -313,6 +313,27 @@ def test_a_ball_that_is_led_far_at_once_does_not_pass_through():
         expect_same_run(url, frame)
 
 
+def test_a_ball_that_was_led_around_the_part_is_in_no_scene():
+    bracket()
+    with clay("bracket.step", "--size", "4 mm", "--material", "rubber") as (url, _):
+        hand = Hand(url, 16 * "a")
+        hand.act("hold bracket/1", f"push ball {ON_TOP} 0.005")
+        status, text = hand.post("0 0 0.03 0", "stay", "0 0 0.03 -0.02", "stay", "0 0 0 -0.02", "stay", "0 0 0 -0.014", "stay")
+        expect(status == 200, text)
+        saved(url, "part.stl")  # waits until it is at rest
+        for name in ("scene.toml", "scene.tar"):
+            status, _, data = ask(url, f"{url.path}save/{name}")
+            expect(status == 500 and b"tool 1 was led around the part" in data, f"{name}: {status} {data[:300]}")
+        hand.post("keep")
+        saved(url, "part.stl")
+        time.sleep(0.5)
+        expect("led around" in hand.last["said"] and hand.last["kept"] == 0, f"{hand.last['said']} {hand.last['kept']}")
+        # as the message says
+        frame = hand.act("release", "push ball 0.07 0.02 0 0 0 -1 0.005", "0 0 0 0.001", "stay")
+        expect(not frame["said"] and frame["felt"][0][2] < 0, f"{frame['said']} {frame['felt']}")
+        expect_same_run(url, frame)
+
+
 def at_rest(url):
     data = saved(url, "rest.f32")
     return struct.unpack(f"<{len(data) // 4}f", data)
