@@ -244,7 +244,8 @@ std::vector<std::string> verdict(const std::vector<Finding>& all) {
   for (const Finding& each : all)
     if (!each.stiffness)
       return {"no stiffness to compare: the loads of " + each.file +
-              " have no resultant, or nothing moves; compare displacements and stresses above"};
+              " have no resultant, an [[indenter]] pushes, or nothing moves; compare displacements and "
+              "stresses above"};
   const std::vector<std::size_t> order = order_of(all);
   std::vector<std::string> lines;
   for (std::size_t i = 0; i + 1 < order.size(); ++i) {

@@ -24,6 +24,7 @@
 #include "mapping/cad_output.h"
 #include "mapping/output.h"
 #include "simulate/effects/rigid.h"
+#include "simulate/indent/indenters.h"
 #include "simulate/result/options.h"
 #include "simulate/simulate.h"
 #include "simulate/time/dynamic_relaxation.h"
@@ -317,11 +318,15 @@ std::vector<Output> plan_outputs(const CompensateArguments& arguments) {
   return outputs;
 }
 
-void refuse_time(const simulate::Scene& scene) {
+void refuse_uncompensated(const simulate::Scene& scene) {
   const auto refuse = [&](const std::string& what) {
     throw InputError(scene.name, "compensation is for runs to equilibrium, and " + what);
   };
   if (scene.run.time) refuse("this scene is a timed run");
+  if (!scene.get<simulate::Indenters>().indenters.empty())
+    throw InputError(
+        scene.name,
+        "[[indenter]] pushes the part out of the shape that is wanted, whatever is made: leave it out");
   if (!settles(scene)) return;
   const auto& rigid = scene.get<simulate::RigidParts>();
   if (!rigid.parts.empty()) refuse("rigid parts come to rest by a run in time: leave them out");
@@ -352,7 +357,7 @@ int compensate_command(int argc, char** argv) {
   plan_after_files(arguments.job, [&] {
     outputs = plan_outputs(arguments);
     job = plan_job(arguments.job);
-    refuse_time(job.scene);
+    refuse_uncompensated(job.scene);
   });
   const ThreadLimit limit(arguments.threads);
   Progress progress("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);

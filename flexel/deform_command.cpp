@@ -687,14 +687,16 @@ bool has_thin_walls(const SolvedRun& run) {
 }
 
 // Model `quadratic` takes the scene: equilibrium without contact.
-bool suits_quadratic(const SolvedRun& run) {
-  return !QuadraticField::is_in(run.voxels.body) && !run.simulated.timed && !run.simulated.settled;
+bool suits_quadratic(const SolvedRun& run, const simulate::Scene& scene) {
+  return !QuadraticField::is_in(run.voxels.body) && !run.simulated.timed && !run.simulated.settled &&
+         scene.get<simulate::Indenters>().indenters.empty();
 }
 
 // What to do next, of this run.
-std::string next_step(const SolvedRun& run, const std::optional<AccuracyReport>& accuracy) {
+std::string next_step(const SolvedRun& run, const simulate::Scene& scene,
+                      const std::optional<AccuracyReport>& accuracy) {
   if (!accuracy) return "";
-  if (suits_quadratic(run) && has_thin_walls(run) && accuracy->dropped_model.empty() &&
+  if (suits_quadratic(run, scene) && has_thin_walls(run) && accuracy->dropped_model.empty() &&
       !accuracy->tried_quadratic)
     return "--model quadratic is made for walls as thin as these";
   std::string chosen_for;
@@ -758,7 +760,7 @@ std::vector<std::string> last_lines(const SolvedRun& run, const Plan& plan,
       if (const std::string line = infill_line(body.parts[p].name, materials[p]); !line.empty())
         lines.push_back(line);
   for (const std::string& line :
-       answer_lines(run.simulated, body, materials, next_step(run, accuracy), "--size"))
+       answer_lines(run.simulated, body, materials, next_step(run, plan.job.scene, accuracy), "--size"))
     lines.push_back(line);
   for (const mapping::CadAnswer& each : cad) lines.insert(lines.end() - 1, "faces      " + each.line);
   return lines;

@@ -89,6 +89,9 @@ def test_runs_in_time_are_refused():
         pathlib.Path(f"{name}.toml").write_text(scene + more)
         done = run("flexel", "compensate", "shelf.stl", "--scene", f"{name}.toml", "--size", "3mm", "-o", "make.stl")
         expect_error(done, "flexel", f"{name}.toml", word, "equilibrium")
+    pathlib.Path("pushed.toml").write_text(scene + '[[indenter]]\nball = { centre = ["40 mm", "5 mm", "10 mm"], radius = "6 mm" }\n')
+    done = run("flexel", "compensate", "shelf.stl", "--scene", "pushed.toml", "--size", "3mm", "-o", "make.stl")
+    expect_error(done, "flexel", "pushed.toml", "[[indenter]]")
 
 
 def test_a_part_on_stdout_is_refused():
