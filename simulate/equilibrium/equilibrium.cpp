@@ -41,6 +41,7 @@ constexpr double kLoweringIncrement = 1.0 / 32;    // from this one on energy-lo
 constexpr int kEasyIterations = 10;
 constexpr int kFullStepIterations = 20;
 constexpr int kIterations = 100;                // of Newton in a run, unless the scene says
+constexpr int kIndentedIterations = 300;        // likewise with indenters: some attempts go through them
 constexpr int kOverloadIterations = 40;         // likewise where the load is out of proportion
 constexpr int kIterationsPerLoadStep = 10;      // that one which ends in equilibrium adds to those of the run
 constexpr int kIterationsPerIndentedStep = 40;  // likewise, with indenters
@@ -149,10 +150,12 @@ class LoadStepping {
   double least_residual_ = 1;  // relative, of the attempts since the last equilibrium
   bool indented_ = false;  // a whole step is no good where what touches changes, and the energy tells the way
   bool lowers_ = false;    // ... and one has not been
+  bool gone_through_ = false;  // the last attempt led the part through one: so will other steps as long
 };
 
 int LoadStepping::iterations_left() const {
-  const int allowed = settings_.newton_iterations.value_or(overloaded() ? kOverloadIterations : kIterations);
+  const int usual = indented_ ? kIndentedIterations : kIterations;
+  const int allowed = settings_.newton_iterations.value_or(overloaded() ? kOverloadIterations : usual);
   const int more = indented_ ? kIterationsPerIndentedStep : kIterationsPerLoadStep;
   return allowed + more * result_.load_steps + kPushedIterations * pushes_ + spent_near_ -
          result_.newton_iterations;
@@ -228,10 +231,12 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
 }
 
 void LoadStepping::refuse_gone_through(const std::vector<RigidLink>& links_before) {
+  gone_through_ = false;
   const Indenters* indenters = find_indenters(mechanics_.effects());
   if (!outcome_.converged || !indenters) return;
   const std::string name = indenters->gone_through(indenters->places(done_), state_.displacement, trial_);
-  if (name.empty()) return;
+  gone_through_ = !name.empty();
+  if (!gone_through_) return;
   outcome_.converged = false;
   outcome_.relative_residual = 1;
   outcome_.trouble = fmt::format("the part goes through indenter \"{}\"", name);
@@ -350,12 +355,14 @@ void LoadStepping::solve() {
     farthest_reach_ = kFarReach * bounding_box(mechanics_.body().rest).diagonal();
   hopeless_reach_ = out_of_proportion();
   while (done_ < 1) {
+    gone_through_ = false;
     if (!lowers_ && attempt(NewtonSteps::full, kFullStepIterations)) continue;
     if (reach_ > hopeless_reach_) refuse_load();
     hopeless_reach_ = std::numeric_limits<double>::infinity();  // the first answer alone counts
     if (begin_near()) continue;
-    if (iterations_left() > 0 && (indented_ || length_.get() <= kLoweringIncrement * first_) &&
-        !mechanics_.follows() && attempt(NewtonSteps::lowering, NewtonOptions().max_iterations)) {
+    if (iterations_left() > 0 && !gone_through_ &&
+        (indented_ || length_.get() <= kLoweringIncrement * first_) && !mechanics_.follows() &&
+        attempt(NewtonSteps::lowering, NewtonOptions().max_iterations)) {
       lowers_ = indented_;
       continue;
     }
