@@ -313,6 +313,19 @@ def test_a_ball_that_is_led_far_at_once_does_not_pass_through():
         expect_same_run(url, frame)
 
 
+def test_a_part_that_is_pulled_onto_a_ball_does_not_pass_through():
+    write("bar.stl", ascii_stl(box_triangles((80.0, 20.0, 10.0)), "box"))
+    with clay("bar.stl", "--size", "5 mm", "--material", "rubber") as (url, _):
+        hand = Hand(url, 16 * "a")
+        hand.act("hold box/xmin", "push ball 0.04 0.01 0 0 0 -1 0.006", "0 0 0 -0.002", "stay", "grab face box/xmax")
+        at_once = hand.act("0 0 0 -0.02", "stay")["felt"]
+        hand.act("undo")
+        for k in range(1, 11):
+            slowly = hand.act(f"0 0 0 {-0.002 * k}", "stay")["felt"]
+        expect(slowly[0][2] < -1, f"the part presses the ball down: {slowly}")
+        expect(max(abs(a - b) for one, other in zip(at_once, slowly) for a, b in zip(one[:3], other[:3])) < 1e-3 * abs(slowly[0][2]), f"{at_once} {slowly}")
+
+
 def test_a_ball_that_was_led_around_the_part_is_in_no_scene():
     bracket()
     with clay("bracket.step", "--size", "4 mm", "--material", "rubber") as (url, _):
