@@ -663,7 +663,7 @@ Answer ClaySession::save(const std::string& name) {
       return {200, bytes_of(name == "rest.vtu" ? *first_ : bent(document))};
     for (const char* format : kFormats)
       if (name == std::string("part.") + format) return mapped(name, bent(document));
-    if (name.starts_with("scene")) refuse_detour(document, base_);
+    if (name == "scene.toml" || name == "scene.tar") refuse_detour(document, base_);
     if (name == "scene.tar") {
       std::vector<std::pair<std::string, std::string>> files = scenes_of(document, base_);
       files.emplace(files.begin(), "rest.vtu", bytes_of(*first_));
