@@ -30,7 +30,6 @@
 #include "simulate/estimate/error_bars.h"
 #include "simulate/estimate/stress_singularity.h"
 #include "simulate/events/fused.h"
-#include "simulate/indent/indenters.h"
 #include "simulate/joints/joints.h"
 #include "simulate/matter/fragments.h"
 #include "simulate/matter/stress.h"
@@ -125,10 +124,6 @@ void refuse_timed(const SimulateOptions& options, const std::string& scene) {
 void refuse_kernel(const SimulateOptions& options, const std::string& scene) {
   if (!options.isa.empty())
     throw InputError(scene, "--isa is for timed runs: give [run] time = \"1 s\", or leave it out");
-}
-
-void warn_of(const Indenters& indenters, const State& state, Progress& progress) {
-  for (const std::string& warning : indenters.warnings(state)) progress.warn(warning);
 }
 
 class Run {
@@ -280,9 +275,9 @@ SimulateResult Run::operator()() {
   const bool from_rest = std::all_of(state_.displacement.begin(), state_.displacement.end(),
                                      [](const Vec3& u) { return u.isZero(0); });
   const EquilibriumResult solved = solve(mechanics);
-  // Hindered free strain stiffens or softens the first answer, which says nothing of buckling then.
-  const Indenters* indenters = find_indenters(mechanics.effects());  // contact does so likewise
-  if (from_rest && !solved.buckled && !indenters)
+  // Hindered free strain stiffens or softens the first answer, and so does what touches: it says nothing of
+  // buckling then.
+  if (from_rest && !solved.buckled && !mechanics.unilateral())
     linear_reach_ = body_.cell_columns.contains(kFreeStrainColumn)
                         ? linear_reach_beside_free_strain(mechanics)
                         : solved.linear_reach;
@@ -291,7 +286,8 @@ SimulateResult Run::operator()() {
   followers_ = follower_memory(mechanics);
   mechanics.report(state_, result);
   for (const std::string& warning : warnings_of(result)) progress_.warn(scene_.name + ": " + warning);
-  if (indenters) warn_of(*indenters, state_, progress_);
+  for (const ActiveEffect& effect : mechanics.effects())
+    for (const std::string& warning : effect->warnings(state_)) progress_.warn(warning);
   result.elastic_energy = mechanics.elastic_energy(state_);
   result.smallest_jacobian = mechanics.most_compressed(state_).value;
   measure_corners(mechanics.cells(), body_, state_, result, progress_);

@@ -228,21 +228,21 @@ std::string Contact::why() const {
   return fmt::format("[contact], {} points", contacts_->points().size());
 }
 
-std::string Contact::unsure_fits() const {
+std::vector<std::string> Contact::warnings(const State&) const {
   const std::vector<UnsureFit>& fits = contacts_->unsure_fits();
-  if (fits.empty()) return "";
+  if (fits.empty()) return {};
   const UnsureFit& worst = *std::max_element(fits.begin(), fits.end(), [](const auto& a, const auto& b) {
     return a.misfit / a.width < b.misfit / b.width;
   });
   const std::string others =
       fits.size() > 1 ? fmt::format(", and {} other pair(s) of parts", human_count(fits.size() - 1)) : "";
-  return fmt::format(
+  return {fmt::format(
       "[contact] curved surfaces of parts \"{}\" and \"{}\"{} fit each other to {} ({:.2g} cells), too "
       "little to "
       "be told from their facets: an interference or an offset so small may press with half of its force, "
       "with twice that or not at all; smaller cells and finer facets tell",
       names_[worst.parts[0]], names_[worst.parts[1]], others, human_length(worst.misfit),
-      worst.misfit / worst.width);
+      worst.misfit / worst.width)};
 }
 
 double Contact::energy(const State& state) {

@@ -58,8 +58,8 @@ class Contact : public Effect {
   static void parse(TableReader& scene, Parameters& parameters);
   [[nodiscard]] static std::optional<Contact> make(const Parameters& parameters, const Problem& problem);
   [[nodiscard]] std::string why() const override;
-  // For people: parts that fit each other too nearly for their force to be known; "" where there are none.
-  [[nodiscard]] std::string unsure_fits() const;
+  // Parts that fit each other too nearly for their force to be known.
+  [[nodiscard]] std::vector<std::string> warnings(const State& state) const override;
 
   [[nodiscard]] EnergyAccount account() const override { return EnergyAccount::stored; }
   [[nodiscard]] bool adds_stiffness() const override { return true; }

@@ -91,6 +91,9 @@ class Effect {
   [[nodiscard]] virtual bool finishes_steps() const { return false; }
   // added_frequency() or finish_step() reads the masses.
   [[nodiscard]] virtual bool needs_mass() const { return false; }
+  // Its forces set in where surfaces touch. So at equilibrium it holds nothing, what it does is in proportion to
+  // nothing, and full Newton steps may go to and fro.
+  [[nodiscard]] virtual bool unilateral() const { return false; }
   // Elements between which its forces act; they are inner forces then, and hold nothing.
   [[nodiscard]] virtual std::vector<CoupledElements> couples() const { return {}; }
 
@@ -110,8 +113,20 @@ class Effect {
   virtual void accept(const State&) {}
   // Elements that follow a path exactly.
   virtual void constrain(Constraints&) {}
+  // What people should know of it in a state that a run begins with or ends in, a line each.
+  [[nodiscard]] virtual std::vector<std::string> warnings(const State&) const { return {}; }
   // `unbalanced`: N (elements), on elements that are held.
   virtual void report(const State&, const std::vector<Vec3>& /*unbalanced*/, SimulateResult&) {}
+
+  // --- equilibrium (simulate/equilibrium/equilibrium.h) ---
+  // Elements that add_stiffness() may add to in some state, though add_forces() does not pull at them in most.
+  [[nodiscard]] virtual std::vector<std::uint32_t> may_pull_at() const { return {}; }
+  // Share of the load that one load step may have at most.
+  [[nodiscard]] virtual double longest_load_step() const { return 1; }
+  // Why a load step did not lead from one equilibrium to the other, though forces balance in both; empty: it did.
+  [[nodiscard]] virtual std::string refuses_load_step(const State& /*before*/, const State& /*after*/) const {
+    return {};
+  }
 
   // --- timed runs (simulate/time/timed_run.h) ---
   // What it asks of the hot kernel. Then, when all have asked, whether that suffices; throws InputError.

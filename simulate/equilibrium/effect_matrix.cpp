@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "simulate/indent/indenters.h"
 #include "simulate/linear/level.h"
 
 namespace flexel::simulate {
@@ -23,8 +22,8 @@ std::vector<std::uint8_t> touched_elements(const Body& body, const BlockMatrix& 
   for (const ActiveEffect& effect : effects)
     if (effect->adds_stiffness()) effect->add_forces(state, forces);
   std::vector<std::uint8_t> touched(n, 0);
-  if (const Indenters* indenters = find_indenters(effects))
-    for (const std::uint32_t e : indenters->may_push()) touched[e] = 1;
+  for (const ActiveEffect& effect : effects)
+    for (const std::uint32_t e : effect->may_pull_at()) touched[e] = 1;
   for (std::size_t e = 0; e < n; ++e)
     if (forces[e] != Vec3::Zero())
       for (std::uint64_t q = pattern.row_offsets[e]; q < pattern.row_offsets[e + 1]; ++q)

@@ -27,7 +27,6 @@
 #include "base/units.h"
 #include "simulate/equilibrium/load_step_length.h"
 #include "simulate/equilibrium/rigid_link_equilibrium.h"
-#include "simulate/indent/indenters.h"
 #include "simulate/input/scene_words.h"
 #include "simulate/models/rest_shape.h"
 #include "simulate/result/overload.h"
@@ -40,15 +39,15 @@ constexpr double kSmallestIncrement = 1.0 / 1024;  // of the first load step
 constexpr double kLoweringIncrement = 1.0 / 32;    // from this one on energy-lowering steps are tried too
 constexpr int kEasyIterations = 10;
 constexpr int kFullStepIterations = 20;
-constexpr int kIterations = 100;                // of Newton in a run, unless the scene says
-constexpr int kIndentedIterations = 300;        // likewise with indenters: some attempts go through them
-constexpr int kOverloadIterations = 40;         // likewise where the load is out of proportion
-constexpr int kIterationsPerLoadStep = 10;      // that one which ends in equilibrium adds to those of the run
-constexpr int kIterationsPerIndentedStep = 40;  // likewise, with indenters
-constexpr double kLargestTurn = 0.25;           // turns, of a rotation in one load step
-constexpr double kBalanced = 1e-2;              // relative residual of an attempt that fails as buckling does
-constexpr double kPush = 0.01;                  // of the spacing, to leave a branch with
-constexpr double kPushedIncrement = 0.25;       // of the first load step: how far beyond the branching
+constexpr int kIterations = 100;            // of Newton in a run, unless the scene says
+constexpr int kUnilateralIterations = 300;  // likewise where surfaces touch: some attempts go through
+constexpr int kOverloadIterations = 40;     // likewise where the load is out of proportion
+constexpr int kIterationsPerLoadStep = 10;  // that one which ends in equilibrium adds to those of the run
+constexpr int kIterationsPerUnilateralStep = 40;  // likewise, where surfaces touch
+constexpr double kLargestTurn = 0.25;             // turns, of a rotation in one load step
+constexpr double kBalanced = 1e-2;         // relative residual of an attempt that fails as buckling does
+constexpr double kPush = 0.01;             // of the spacing, to leave a branch with
+constexpr double kPushedIncrement = 0.25;  // of the first load step: how far beyond the branching
 constexpr int kPushedIterations = 300;
 constexpr int kMostPushes = 4;         // of a run
 constexpr double kUnsupported = 1e-9;  // of the stiffness of an element in its stiffest direction
@@ -63,13 +62,13 @@ std::string point_name(const Vec3& at) {
   return fmt::format("({}, {}, {})", human_length(at.x()), human_length(at.y()), human_length(at.z()));
 }
 
-// Load steps that follow every rotation along its arc, and lead no indenter too far.
+// Load steps that follow every rotation along its arc, and are short enough for every effect.
 int least_load_steps(const Mechanics& mechanics) {
   double steps = 1;
   for (const Motion& motion : mechanics.constraints().motions)
     steps = std::max(steps, std::abs(motion.angle) / (2 * std::numbers::pi) / kLargestTurn);
-  if (const Indenters* indenters = find_indenters(mechanics.effects()))
-    steps = std::max(steps, 1 / indenters->longest_share());
+  for (const ActiveEffect& effect : mechanics.effects())
+    steps = std::max(steps, 1 / effect->longest_load_step());
   return static_cast<int>(std::ceil(steps - 1e-9));
 }
 
@@ -97,9 +96,8 @@ class LoadStepping {
         progress_(progress),
         start_(start),
         first_(1.0 / std::max(settings.load_steps, least_load_steps(mechanics))),
-        length_(first_) {
-    indented_ = find_indenters(mechanics.effects()) != nullptr;
-  }
+        length_(first_),
+        unilateral_(mechanics.unilateral()) {}
 
   EquilibriumResult operator()();
 
@@ -107,8 +105,8 @@ class LoadStepping {
   void solve();
   // Tries the next share; true and moved on when it converged.
   bool attempt(NewtonSteps steps, int max_iterations);
-  // Where the part has gone through an indenter, what was found is none.
-  void refuse_gone_through(const std::vector<RigidLink>& links_before);
+  // What was found is no equilibrium where an effect refuses the way to it.
+  void refuse_way(const std::vector<RigidLink>& links_before);
   [[nodiscard]] bool gives_up() const {
     return length_.get() <= kSmallestIncrement * first_ || iterations_left() <= 0;
   }
@@ -148,15 +146,15 @@ class LoadStepping {
   bool pushed_ = false;            // the next attempt starts beside the last equilibrium
   int pushes_ = 0;
   double least_residual_ = 1;  // relative, of the attempts since the last equilibrium
-  bool indented_ = false;  // a whole step is no good where what touches changes, and the energy tells the way
-  bool lowers_ = false;    // ... and one has not been
-  bool gone_through_ = false;  // the last attempt led the part through one: so will other steps as long
+  bool unilateral_;       // a whole step is no good where what touches changes, and the energy tells the way
+  bool lowers_ = false;   // ... and one has not been
+  bool refused_ = false;  // the last attempt, by an effect: so will other steps as long be
 };
 
 int LoadStepping::iterations_left() const {
-  const int usual = indented_ ? kIndentedIterations : kIterations;
+  const int usual = unilateral_ ? kUnilateralIterations : kIterations;
   const int allowed = settings_.newton_iterations.value_or(overloaded() ? kOverloadIterations : usual);
-  const int more = indented_ ? kIterationsPerIndentedStep : kIterationsPerLoadStep;
+  const int more = unilateral_ ? kIterationsPerUnilateralStep : kIterationsPerLoadStep;
   return allowed + more * result_.load_steps + kPushedIterations * pushes_ + spent_near_ -
          result_.newton_iterations;
 }
@@ -217,7 +215,7 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   result_.newton_iterations += outcome_.iterations;
   result_.cg_iterations += outcome_.cg_iterations;
   result_.linear_seconds += outcome_.linear_seconds;
-  refuse_gone_through(links);
+  refuse_way(links);
   least_residual_ = outcome_.converged ? 1 : std::min(least_residual_, outcome_.relative_residual);
   if (!outcome_.converged) return false;
   done_ = trial_.share;
@@ -230,16 +228,20 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   return true;
 }
 
-void LoadStepping::refuse_gone_through(const std::vector<RigidLink>& links_before) {
-  gone_through_ = false;
-  const Indenters* indenters = find_indenters(mechanics_.effects());
-  if (!outcome_.converged || !indenters) return;
-  const std::string name = indenters->gone_through(indenters->places(done_), state_.displacement, trial_);
-  gone_through_ = !name.empty();
-  if (!gone_through_) return;
+void LoadStepping::refuse_way(const std::vector<RigidLink>& links_before) {
+  refused_ = false;
+  if (!outcome_.converged) return;
+  std::string why;
+  if (unilateral_) {
+    const State before{state_.displacement, done_};
+    for (const ActiveEffect& effect : mechanics_.effects())
+      if (why.empty()) why = effect->refuses_load_step(before, trial_);
+  }
+  refused_ = !why.empty();
+  if (!refused_) return;
   outcome_.converged = false;
   outcome_.relative_residual = 1;
-  outcome_.trouble = fmt::format("the part goes through indenter \"{}\"", name);
+  outcome_.trouble = why;
   auto link = links_before.begin();
   for (const Motion& motion : mechanics_.constraints().motions)
     if (motion.link) *motion.link = *link++;
@@ -355,15 +357,14 @@ void LoadStepping::solve() {
     farthest_reach_ = kFarReach * bounding_box(mechanics_.body().rest).diagonal();
   hopeless_reach_ = out_of_proportion();
   while (done_ < 1) {
-    gone_through_ = false;
+    refused_ = false;
     if (!lowers_ && attempt(NewtonSteps::full, kFullStepIterations)) continue;
     if (reach_ > hopeless_reach_) refuse_load();
     hopeless_reach_ = std::numeric_limits<double>::infinity();  // the first answer alone counts
     if (begin_near()) continue;
-    if (iterations_left() > 0 && !gone_through_ &&
-        (indented_ || length_.get() <= kLoweringIncrement * first_) && !mechanics_.follows() &&
-        attempt(NewtonSteps::lowering, NewtonOptions().max_iterations)) {
-      lowers_ = indented_;
+    if (iterations_left() > 0 && !refused_ && (unilateral_ || length_.get() <= kLoweringIncrement * first_) &&
+        !mechanics_.follows() && attempt(NewtonSteps::lowering, NewtonOptions().max_iterations)) {
+      lowers_ = unilateral_;
       continue;
     }
     if (!gives_up()) {
@@ -390,7 +391,7 @@ void refuse_free_motions(Mechanics& mechanics, const State& start, const std::st
   // says nothing of what holds it.
   const bool stressed = RestShapes(mechanics.body()).any();
   const std::vector<Mat3> none(stressed ? mechanics.body().cell_count() : 0, Mat3::Zero());
-  // Indenters hold nothing: they are taken where they begin.
+  // What touches holds nothing: it is taken where it begins.
   State begun = start;
   begun.share = 0;
   mechanics.assemble(begun, {false, stressed ? &none : nullptr});

@@ -9,7 +9,6 @@
 
 #include "base/math/eigenvalues.h"
 #include "base/parallel.h"
-#include "simulate/indent/indenters.h"
 #include "simulate/thermal/free_strain.h"
 
 namespace flexel::simulate {
@@ -168,6 +167,11 @@ void Mechanics::eliminate_prescribed() {
     eliminate(constraints_, pattern_.matrix);
 }
 
+bool Mechanics::unilateral() const {
+  return std::any_of(effects_.begin(), effects_.end(),
+                     [](const ActiveEffect& effect) { return effect->unilateral(); });
+}
+
 MostCompressed Mechanics::most_compressed(const State& state) const {
   MostCompressed most;
   if (body_.cell_count() > 0) {
@@ -189,7 +193,7 @@ std::vector<std::uint8_t> Mechanics::tied_elements() {
   std::fill(matrix.values.begin(), matrix.values.end(), Block::Zero());
   const State rest{std::vector<Vec3>(body_.element_count(), Vec3::Zero()), 1};
   for (const ActiveEffect& effect : effects_)
-    if (effect.couples.empty() && !as_indenters(effect)) effect->add_stiffness(rest, matrix);
+    if (effect.couples.empty() && !effect->unilateral()) effect->add_stiffness(rest, matrix);
   for (std::uint32_t e = 0; e < tied.size(); ++e) {
     if (constraints_.mask[e] != 0) tied[e] = constraints_.mask[e] == 7 ? 2 : 1;
     for (std::size_t entry = matrix.row_offsets[e]; entry < matrix.row_offsets[e + 1]; ++entry)

@@ -45,6 +45,8 @@ class Mechanics {
   [[nodiscard]] const LinearOperator& tangent() const { return *tangent_; }
   // Some load follows the shape (Effect::follows()): the energy tells nothing of it.
   [[nodiscard]] bool follows() const { return followed_.has_value(); }
+  // Some effect is (Effect::unilateral()).
+  [[nodiscard]] bool unilateral() const;
   // Likewise with what such loads add, not symmetric; tangent() where none follows.
   [[nodiscard]] const LinearOperator& whole_tangent() const {
     return follows() ? static_cast<const LinearOperator&>(*followed_) : *tangent_;

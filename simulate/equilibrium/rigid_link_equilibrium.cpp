@@ -16,7 +16,6 @@
 #include "base/error.h"
 #include "base/math/dense.h"
 #include "base/parallel.h"
-#include "simulate/indent/indenters.h"
 #include "simulate/linear/conjugate_gradients.h"
 #include "simulate/linear/multigrid.h"
 
@@ -222,7 +221,7 @@ NewtonOutcome Balance::settle(double from, double to) {
 // Moves the links until nothing is lacking. False when it did not get there.
 bool Balance::find() {
   // Where a step of the links makes the body touch something, its slope is another.
-  const bool touches = find_indenters(mechanics_.effects()) != nullptr;
+  const bool touches = mechanics_.unilateral();
   LinkVector left = lacking(state_);
   Eigen::MatrixXd slope;
   bool serves = false;

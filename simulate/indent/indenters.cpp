@@ -192,7 +192,7 @@ std::optional<double> way_clear(const IndenterShape& shape, const IndenterPlace&
 
 const Indenters* find_indenters(const std::vector<ActiveEffect>& effects) {
   for (const ActiveEffect& effect : effects)
-    if (const Indenters* found = as_indenters(effect)) return found;
+    if (const auto* found = dynamic_cast<const Indenters*>(&effect.untimed())) return found;
   return nullptr;
 }
 
@@ -304,7 +304,7 @@ void Indenters::add_stiffness(const State& state, BlockMatrix& matrix) {
                     });
 }
 
-std::vector<std::uint32_t> Indenters::may_push() const {
+std::vector<std::uint32_t> Indenters::may_pull_at() const {
   std::vector<std::uint32_t> elements;
   for (const Patch& patch : patches_)
     elements.insert(elements.end(), patch.elements.begin(), patch.elements.end());
@@ -313,7 +313,7 @@ std::vector<std::uint32_t> Indenters::may_push() const {
   return elements;
 }
 
-double Indenters::longest_share() const {
+double Indenters::longest_load_step() const {
   double longest = 1;
   for (const Indenter& indenter : indenters_)
     if (const double way = indenter.way(); !indenter.motion.link && way > 0)
@@ -344,6 +344,11 @@ std::string Indenters::gone_through(const std::vector<IndenterPlace>& before,
     }
   }
   return "";
+}
+
+std::string Indenters::refuses_load_step(const State& before, const State& after) const {
+  const std::string which = gone_through(places(before.share), before.displacement, after);
+  return which.empty() ? "" : fmt::format("the part goes through indenter \"{}\"", which);
 }
 
 std::vector<double> Indenters::depths(const State& state) const {

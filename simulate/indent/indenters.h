@@ -8,8 +8,8 @@
 // touch. A multiplier (augmented Lagrangian) would let nothing in, and have no energy by which the steps are judged.
 //
 // A point of the surface does not know which side it came from: where the indenter goes further in one go than its
-// rounding, it may come out on the other. So no load step leads it by more than half of that (longest_share()), and one
-// in which the part itself goes through (gone_through()) is taken in shorter ones.
+// rounding, it may come out on the other. So no load step leads it by more than half of that (longest_load_step()), and
+// one in which the part itself goes through (gone_through()) is taken in shorter ones.
 #pragma once
 #include "simulate/conditions/motion.h"
 #include "simulate/effects/effect.h"
@@ -58,10 +58,10 @@ class Indenters : public Effect {
   [[nodiscard]] bool adds_stiffness() const override { return true; }
   // Without the part that makes it indefinite where points are deeper than a solution has them.
   void add_stiffness(const State& state, BlockMatrix& matrix) override;
-  // Elements that it pushes at in some states; it holds none.
-  [[nodiscard]] std::vector<std::uint32_t> may_push() const;
-  // Of the load, that one step of it may be long.
-  [[nodiscard]] double longest_share() const;
+  [[nodiscard]] bool unilateral() const override { return true; }
+  [[nodiscard]] std::vector<std::uint32_t> may_pull_at() const override;
+  [[nodiscard]] double longest_load_step() const override;
+  [[nodiscard]] std::string refuses_load_step(const State& before, const State& after) const override;
   // Cells, that the surface is inside at most, of each.
   [[nodiscard]] std::vector<double> depths(const State& state) const;
   [[nodiscard]] std::vector<IndenterPlace> places(double share) const;
@@ -69,8 +69,8 @@ class Indenters : public Effect {
   // were at these places; empty: of none.
   [[nodiscard]] std::string gone_through(const std::vector<IndenterPlace>& before,
                                          const std::vector<Vec3>& displacement, const State& state) const;
-  // For people: what touches nothing, what is deeper than kDeepest.
-  [[nodiscard]] std::vector<std::string> warnings(const State& state) const;
+  // What touches nothing, what is deeper than kDeepest.
+  [[nodiscard]] std::vector<std::string> warnings(const State& state) const override;
   void report(const State& state, const std::vector<Vec3>& unbalanced, SimulateResult& result) override;
 
  private:
@@ -99,9 +99,6 @@ class Indenters : public Effect {
   std::vector<Patch> patches_;
 };
 
-[[nodiscard]] inline const Indenters* as_indenters(const ActiveEffect& effect) {
-  return dynamic_cast<const Indenters*>(&effect.untimed());
-}
 // Null where there are none.
 [[nodiscard]] const Indenters* find_indenters(const std::vector<ActiveEffect>& effects);
 

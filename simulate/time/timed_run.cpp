@@ -71,8 +71,8 @@ class TimedRun {
   void apply(std::size_t end);
   void bond_joined(std::size_t first, const State& state);
   void keep_motion(const CarriedMotion& carried, const Event& event);
-  [[nodiscard]] std::string unsure_fits() const;
-  void warn_of_unsure_fits(const std::string& told = "");  // unless that is all
+  [[nodiscard]] std::vector<std::string> warnings_of_effects() const;
+  void warn_of_effects(const std::vector<std::string>& told = {});  // but for what is told
   void check();
   void step();
   void advance(bool row);
@@ -155,7 +155,7 @@ void TimedRun::begin() {
   if (!stuck.empty()) start_.transferred_states = {{Contact::name, transfer_of(stuck)}};
   segment_.emplace(body_, scene_, options_, progress_, start_, state_of(body_));
   start_.transferred_states.clear();
-  warn_of_unsure_fits();
+  warn_of_effects();
   const bool sticks = scene_.get<Contact>().sticks() || body_.element_columns.contains("stick_change");
   if (!stuck.empty() && !sticks) {
     progress_.warn(
@@ -175,14 +175,16 @@ void TimedRun::begin() {
                     stuck.size() - found, stuck.size()));
 }
 
-std::string TimedRun::unsure_fits() const {
+std::vector<std::string> TimedRun::warnings_of_effects() const {
+  std::vector<std::string> lines;
   for (const ActiveEffect& effect : segment_->effects())
-    if (const auto* contact = dynamic_cast<const Contact*>(&effect.untimed())) return contact->unsure_fits();
-  return "";
+    for (std::string& line : effect->warnings(segment_->state())) lines.push_back(std::move(line));
+  return lines;
 }
 
-void TimedRun::warn_of_unsure_fits(const std::string& told) {
-  if (const std::string line = unsure_fits(); !line.empty() && line != told) progress_.warn(line);
+void TimedRun::warn_of_effects(const std::vector<std::string>& told) {
+  for (const std::string& line : warnings_of_effects())
+    if (std::find(told.begin(), told.end(), line) == told.end()) progress_.warn(line);
 }
 
 void TimedRun::resume(const Checkpoint& from) {
@@ -195,7 +197,7 @@ void TimedRun::resume(const Checkpoint& from) {
   next_row_ = from.next_row;
   next_frame_ = from.next_frame;
   frames_ = from.frames.times.size();
-  warn_of_unsure_fits();
+  warn_of_effects();
 }
 
 // Within an implicit step: what was reached before it stays.
@@ -428,7 +430,7 @@ void TimedRun::apply(std::size_t end) {
   start_.fused = segment_->fused();
   State state = segment_->state();
   start_.fresh = false;
-  const std::string unsure = unsure_fits();
+  const std::vector<std::string> told = warnings_of_effects();
   segment_.reset();
   const Event* resolution = nullptr;  // that changes in these events
   for (std::size_t n = events_; n < end; ++n)
@@ -459,7 +461,7 @@ void TimedRun::apply(std::size_t end) {
   segment_.emplace(body_, scene_, options_, progress_, start_, std::move(state));
   sound_.keep(segment_->state());  // of the elements that there are now
   if (carried) keep_motion(*carried, *resolution);
-  if (body_.parts.size() > parts) warn_of_unsure_fits(unsure);
+  if (body_.parts.size() > parts) warn_of_effects(told);
   if (!was_edited && edits_damping(body_) && !segment_->damps())
     progress_.warn("edit: the scene has no [damping] that \"damping\" could change");
   segment_->set_hear([this](const std::string& note) { listen(note); });
