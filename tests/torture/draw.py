@@ -27,6 +27,9 @@ OPTIONS = {
                       "--max-elements": ["5000"], "--no-estimate": None},
     "flexel picture": {"--size": ["64x64", "320x240", "1x1", "100000x100000", "0x0", "nanxnan"], "--threads": ["1", "3"], "--timeout": ["0.2 s"]},
     "flexel info": {"--json": None, "--unit": ["mm", "m", "x"], "--edge": LENGTHS, "--timeout": ["0.2 s"], "--threads": ["1", "3"]},
+    "flexel export": {"--material": ["steel", "PLA", "unobtainium"], "--fix": FACES, "--push": [f"{f}: {a}" for f in FACES for a in AMOUNTS], "--count": NUMBERS, "--size": LENGTHS,
+                      "--element": ["C3D8I", "C3D8", "x"], "--nlgeom": ["auto", "on", "off", "x"], "--mesh": ["hex", "tet", "x"], "--max-elements": ["5000"]},
+    "flexel import-lammps": {"--compress": None, "--quiet": None, "--timeout": ["0.01 s", "1 s", "nan s"], "--max-memory": ["1kB", "30MB"], "--threads": ["0", "3"]},
     "flexel measure": {"--model": ["cells", "springs", "paper"], "--size": LENGTHS, "--poisson": NUMBERS + ["0.3", "0.4999999"], "--material": ["steel", "x"]},
 }
 SURFACES = ["out.stl", "out.obj", "out.ply", "out.off", "out.glb", "out.3mf"]
@@ -88,8 +91,22 @@ class Draw:
     def measure(self, random, most=0):
         return ["flexel", "measure", *options("flexel measure", random, most)], {}, []
 
+    def export(self, random, most=0):
+        if random.random() < .5:
+            name, data = pick(self.stock.parts, random)
+            held = ["--material", "steel", "--fix", "xmin", "--push", "xmax: 0 0 -10 N", "--count", "400"]
+            return ["flexel", "export", name, "--calculix", *(options("flexel export", random, most) if most else held), "--timeout", "30 s", "-o", "out.inp"], {name: data}, ["out.inp"]
+        (body, data), (scene, text) = pick(self.stock.bodies, random), pick(self.stock.timed, random)
+        return ["flexel", "export", body, "--lammps", "--scene", scene, "--timeout", "20 s", "-o", "out.in"], {body: data, scene: text}, ["out.in", "out.data", "out.vtu"]
+
+    def import_lammps(self, random, most=0):
+        words = options("flexel import-lammps", random, most)
+        return ["flexel", "import-lammps", "swing.dump", "swing.vtu", *words, "-o", "out.vtu"], dict(self.stock.exported), ["out.vtu"]
+
     def any(self, random, most=0):
-        return random.choice((self.voxelize, self.simulate, self.map, self.deform, self.picture, self.info, *((self.measure,) if most else ())))(random, most)
+        kinds = [self.voxelize, self.simulate, self.map, self.deform, self.picture, self.info, self.export]
+        kinds += ([self.import_lammps] if "swing.dump" in self.stock.exported else []) + ([self.measure] if most else [])
+        return random.choice(kinds)(random, most)
 
     # --- kinds of trials
 

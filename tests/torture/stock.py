@@ -30,6 +30,9 @@ STATIC = {
     "springs.toml": text('model = "springs"\n' + HELD + PULL, "steel", "30 N"),
     "move.toml": text(HELD + '[[move]]\nwhere = "xmax"\ndisplacement = ["1 mm", "free", "-1 mm"]\n[gravity]\n'
                       'acceleration = ["0 m/s2", "0 m/s2", "-9.81 m/s2"]\n', "PLA"),
+    "ball.toml": text(HELD + '[[indenter]]\nball = { centre = ["20 mm", "5 mm", "20 mm"], radius = "8 mm" }\ndisplacement = ["0 mm", "0 mm", "-3 mm"]\n', "PLA"),
+    "plate.toml": text(HELD + '[[indenter]]\nplate = { centre = ["30 mm", "5 mm", "12 mm"], normal = [0, 0, -1], radius = "8 mm" }\n'
+                       'displacement = ["0 mm", "0 mm", "-3 mm"]\n', "PLA"),
 }
 IN_TIME = {
     "swing.toml": text(HELD + SWAY + '[drag]\ndensity = "1 kg/m3"\n' + TIMED),
@@ -40,7 +43,13 @@ IN_TIME = {
     "events.toml": text(HELD + SWAY + '[damping]\ntime = "2 us"\n[[event]]\nat = "4 ms"\ndo = "renormalise"\n[[event]]\nat = "8 ms"\ndo = "edit"\n'
                         'stiffness = 0.5\nwhere = { box = { min = ["10 mm", "-1 mm", "-1 mm"], max = ["20 mm", "11 mm", "11 mm"] } }\n[[event]]\n'
                         'at = "12 ms"\ndo = "carve"\nwhere = { box = { min = ["14 mm", "4 mm", "4 mm"], max = ["26 mm", "11 mm", "11 mm"] } }\n' + TIMED),
+    "finer.toml": text(HELD + SWAY + '[damping]\ntime = "2 us"\n[[event]]\nat = "5 ms"\ndo = "resolution"\nchange = "finer"\n[[event]]\nat = "15 ms"\n'
+                       'do = "resolution"\nchange = "coarser"\n' + TIMED),
+    "end.toml": text(HELD + SWAY + '[[event]]\nat = "20 ms"\ndo = "edit"\nstiffness = 0.5\n' + TIMED),
+    "spring-swing.toml": text('model = "springs"\n' + HELD.replace('where = "xmin"', 'where = { box = { min = ["-1 mm", "-1 mm", "-1 mm"], max = ["4 mm", "11 mm", "11 mm"] } }')
+                              + SWAY + TIMED),
 }
+LAMMPS = ("spring-swing.toml", "box-rest.vtu")
 POINTS = "name,x,y,z\na,1,2,3\nb,39,5,5\nc,20,1,9\n"
 
 
@@ -56,6 +65,8 @@ class Stock:
             self.scenes[f"{path.parent.name}-{path.name}"] = path.read_bytes()
         self.make_parts(parts_folder)
         self.make_bodies()
+        self.exported = {}
+        self.make_dump()
 
     def run(self, *command):
         return subprocess.run([str(self.programs / command[0]), *command[1:]], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, check=False)
@@ -100,6 +111,23 @@ class Stock:
             if "centre" not in name:
                 self.run("flexel-simulate", "bend.toml", name, "--quiet", "--no-estimate", "-o", name.replace("rest", "bent").replace(".vtu", "-bent.vtu"))
                 self.keep(self.bent, name.replace("rest", "bent").replace(".vtu", "-bent.vtu"))
+
+    def make_dump(self):
+        """A body as it goes to LAMMPS, and a dump of two frames: where it is, and a little further."""
+        scene, body = LAMMPS
+        (self.folder / scene).write_bytes(self.timed[scene])
+        self.run("flexel", "export", body, "--lammps", "--scene", scene, "--quiet", "-o", "swing.in")
+        self.keep(self.exported, "swing.vtu")
+        if "swing.vtu" not in self.exported:
+            return
+        atoms = (self.folder / "swing.data").read_text().split("Atoms # bond")[1].split("Velocities")[0].split("\n")
+        rows = [row.split() for row in atoms if row]
+        frames = []
+        for step, way in ((0, 0), (100, 1e-4)):
+            frames.append(f"ITEM: TIME\n{step * 1e-6}\nITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{len(rows)}\nITEM: BOX BOUNDS ss ss ss\n0 1\n0 1\n0 1\n"
+                          "ITEM: ATOMS id x y z vx vy vz\n")
+            frames += [f"{row[0]} {row[3]} {row[4]} {float(row[5]) + way!r} 0 0 0\n" for row in rows]
+        self.exported["swing.dump"] = "".join(frames).encode()
 
     def counts(self):
         return json.dumps({kind: len(getattr(self, kind)) for kind in ("parts", "bodies", "bent", "scenes", "timed")})
