@@ -15,7 +15,7 @@ CODE = ["base", "formats", "meshes", "voxelize", "simulate", "mapping", "cad", "
 ORDER = """
 base base/math base/files base/program
 formats/part formats/common formats/stl formats/obj formats/ply formats/off formats/gltf formats/threemf formats/cad formats/vdb formats/assimp
-formats/vtu formats/lattice formats/exchange
+formats/vtu formats/lattice formats/pieces formats/exchange
 meshes
 voxelize/types voxelize/mesh voxelize/distances voxelize/classify voxelize/heal voxelize/lattice voxelize
 simulate/laws simulate/input simulate/result simulate/linear simulate/state simulate/rigid simulate/conditions simulate/models
