@@ -24,7 +24,8 @@ struct Bins {
   std::vector<std::uint32_t> triangles;
 };
 
-Bins bin_triangles(const PartMesh& mesh) {
+// Of the slabs in `box`, where one is given.
+Bins bin_triangles(const PartMesh& mesh, const std::optional<VoxelBox>& box) {
   const std::size_t n = mesh.corners.size();
   std::vector<std::array<int, 2>> range(n);
   parallel_for_each(n, [&](std::size_t t) {
@@ -33,8 +34,18 @@ Bins bin_triangles(const PartMesh& mesh) {
         std::minmax({mesh.vertices[c[0]].z(), mesh.vertices[c[1]].z(), mesh.vertices[c[2]].z()});
     range[t] = {floor_int(low), floor_int(high)};
   });
-  int k_begin = range.empty() ? 0 : range[0][0], k_last = k_begin - 1;
+  if (box)
+    for (auto& [low, high] : range) {  // where nothing is left, high is less than low
+      low = std::max(low, box->lower[2]);
+      high = std::min(high, box->upper[2] - 1);
+    }
+  int k_begin = 0, k_last = -1;
   for (const auto& [low, high] : range) {
+    if (high < low) continue;
+    if (k_last < k_begin) {
+      k_begin = low;
+      k_last = high;
+    }
     k_begin = std::min(k_begin, low);
     k_last = std::max(k_last, high);
   }
@@ -78,15 +89,20 @@ struct Box2 {
 // Fills one slab.
 class SlabBuilder {
  public:
-  SlabBuilder(const PartMesh& mesh, const ClassifyOptions& options) : mesh_(mesh), options_(options) {}
+  SlabBuilder(const PartMesh& mesh, const ClassifyOptions& options)
+      : mesh_(mesh), options_(options), box_(options.box.value_or(kAll)) {}
 
   void build(int k, std::span<const std::uint32_t> triangles, Slab& slab) {
     clip(k, triangles);
     if (records_.empty()) return;
-    slab.j_begin = records_.front().j;
+    slab.j_begin = std::max(records_.front().j, box_.lower[1]);
     for (auto row = records_.begin(); row != records_.end();) {
       const auto row_end =
           std::find_if(row, records_.end(), [&](const Record& record) { return record.j != row->j; });
+      if (row->j < box_.lower[1] || row->j >= box_.upper[1]) {
+        row = row_end;
+        continue;
+      }
       while (slab.j_begin + static_cast<int>(slab.row_begin.size()) <= row->j)
         slab.row_begin.push_back(static_cast<std::uint32_t>(slab.pieces.size()));
       sweep_row({row, row_end}, k, slab);
@@ -101,9 +117,17 @@ class SlabBuilder {
     unsorted_.clear();
     for (const std::uint32_t t : triangles) {
       const Corners& c = mesh_.corners[t];
+      if (options_.box && !reaches_rows(c)) continue;
       clip_to_slab({&mesh_.vertices[c[0]], &mesh_.vertices[c[1]], &mesh_.vertices[c[2]]}, t, k, unsorted_);
     }
     sort_by_voxel();
+  }
+
+  // Rows are independent of one another.
+  [[nodiscard]] bool reaches_rows(const Corners& c) const {
+    const auto [low, high] =
+        std::minmax({mesh_.vertices[c[0]].y(), mesh_.vertices[c[1]].y(), mesh_.vertices[c[2]].y()});
+    return high >= box_.lower[1] - 1. && low <= box_.upper[1] + 1.;
   }
 
   // Triangles come in ascending order, and both counting sorts keep the order of what they find equal.
@@ -150,10 +174,10 @@ class SlabBuilder {
       while (end < row.size() && row[end].i == row[n].i) ++end;
       const std::span<const Record> records = row.subspan(n, end - n);
       const VoxelRecords voxel{&mesh_, records, row[n].i, row[n].j, k, corner_windings(winding, records)};
-      add_voxel(voxel, slab);
+      if (row[n].i >= box_.lower[0] && row[n].i < box_.upper[0]) add_voxel(voxel, slab);
       winding = voxel.winding[1];
       if (winding > 0 && end < row.size())
-        for (int i = row[n].i + 1; i < row[end].i; ++i)
+        for (int i = std::max(row[n].i + 1, box_.lower[0]); i < std::min(row[end].i, box_.upper[0]); ++i)
           slab.pieces.push_back({.fill = 1,
                                  .i = i,
                                  .corners = 0xff,
@@ -194,6 +218,7 @@ class SlabBuilder {
       else
         moments_.find(voxel, found, first, slab);
     }
+    if (options_.counted && !options_.counted->holds(voxel.i, voxel.j, voxel.k)) return;
     slab.split_voxels += found.count > 1;
     slab.undecided_voxels += found.undecided && !found.overlapping;
     slab.overlapping_voxels += found.overlapping;
@@ -224,8 +249,12 @@ class SlabBuilder {
                      [](const Trace& a, const Trace& b) { return a.piece < b.piece; });
   }
 
+  static constexpr int kFarthest = 1 << 30;
+  static constexpr VoxelBox kAll{{-kFarthest, -kFarthest, -kFarthest}, {kFarthest, kFarthest, kFarthest}};
+
   const PartMesh& mesh_;
   const ClassifyOptions& options_;
+  const VoxelBox box_;
   PieceFinder finder_;
   MomentFinder moments_;
   std::vector<Record> unsorted_, records_;
@@ -235,7 +264,7 @@ class SlabBuilder {
 }  // namespace
 
 Voxels classify_closed(const PartMesh& mesh, const ClassifyOptions& options) {
-  const Bins bins = bin_triangles(mesh);
+  const Bins bins = bin_triangles(mesh, options.box);
   Voxels voxels;
   voxels.k_begin = bins.k_begin;
   voxels.slabs.resize(bins.begin.size() - 1);

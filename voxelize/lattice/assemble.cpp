@@ -16,14 +16,29 @@
 namespace flexel::voxelize {
 namespace {
 
-constexpr std::uint32_t kNoCell = 0xffffffffu;
-constexpr double kNothing = 1e-9;  // fill: the rim of a face that lies on a lattice plane, no sliver
+constexpr std::uint32_t kNoCell = 0xffffffffu, kElsewhere = kLeftOut;
 
 // Pieces that become something, numbered on from `first`.
 struct KeptPieces {
-  std::vector<std::uint32_t> number;  // (pieces) or kNoCell
+  std::vector<std::uint32_t> number;  // (pieces) or kNoCell, or kElsewhere
   std::size_t count = 0;
 };
+
+// Numbers those that lie outside the box as kElsewhere, and the others on.
+void leave_out(const Voxels& voxels, const VoxelBox& held, std::uint32_t first, KeptPieces& kept) {
+  std::uint32_t next = first;
+  for (std::size_t s = 0; s < voxels.slabs.size(); ++s) {
+    const Slab& slab = voxels.slabs[s];
+    const int k = voxels.k_begin + static_cast<int>(s);
+    for (int j = slab.j_begin; j < slab.j_begin + slab.rows(); ++j)
+      for (std::uint32_t p = slab.row_begin[j - slab.j_begin]; p < slab.row_begin[j - slab.j_begin + 1];
+           ++p) {
+        std::uint32_t& number = kept.number[voxels.first_piece[s] + p];
+        if (number != kNoCell) number = held.holds(slab.pieces[p].i, j, k) ? next++ : kElsewhere;
+      }
+  }
+  kept.count = next - first;
+}
 
 template <class Keep>
 KeptPieces number_kept(const Voxels& voxels, const Keep& keep, std::uint32_t first) {
@@ -61,13 +76,7 @@ bool has_centre(const Piece& piece) {
 template <class Keep>
 AssembledPart count_slab(const Slab& slab, const Keep& keep) {
   AssembledPart result;
-  for (const Piece& piece : slab.pieces) {
-    if (keep(piece))
-      result.volume += piece.fill;
-    else if (std::abs(piece.fill) > kNothing)
-      result.dropped_volume += piece.fill;
-    result.dropped_cells += !keep(piece) && piece.fill > kNothing;
-  }
+  for (const Piece& piece : slab.pieces) add_piece(piece.fill, keep(piece), result);
   return result;
 }
 
@@ -155,7 +164,8 @@ void for_meeting(const Voxels& voxels, const PlacedPiece& at, const Visit& visit
     }
 }
 
-// The kept piece with most fill within two steps through dropped pieces; kNoCell where there is none.
+// The kept piece with most fill within two steps through dropped pieces; kNoCell where there is none, kElsewhere where
+// its cell is not here.
 std::uint32_t substitute(const Voxels& voxels, const PlacedPiece& dropped,
                          const std::vector<std::uint32_t>& cell) {
   std::uint32_t best = kNoCell;
@@ -194,7 +204,7 @@ void trace_slab(const Voxels& voxels, std::size_t s, const std::vector<std::uint
       known = trace.piece;
       number = known_substitute;
     }
-    if (number != kNoCell) pairs.push_back({trace.polygon, number});
+    if (number != kNoCell && number != kElsewhere) pairs.push_back({trace.polygon, number});
   }
 }
 
@@ -214,22 +224,61 @@ void append_cells(const Voxels& voxels, const KeptPieces& kept, std::uint32_t fi
       [&](std::size_t s) {
         const std::uint32_t* cell = &kept.number[voxels.first_piece[s]];
         for (const Piece& piece : voxels.slabs[s].pieces) {
-          if (*cell != kNoCell) body.fill[*cell] = piece.fill;
+          if (*cell != kNoCell && *cell != kElsewhere) body.fill[*cell] = piece.fill;
           ++cell;
         }
       },
       2);
 }
 
+// (elements) Its place among all elements of its lattice plane across `axis`.
+std::vector<std::uint32_t> places_in_planes(const LatticeElements& elements, int axis) {
+  std::vector<std::uint32_t> place(elements.index.size());
+  if (elements.index.empty()) return place;
+  const auto [low, high] =
+      std::minmax_element(elements.index.begin(), elements.index.end(),
+                          [axis](const Index3& a, const Index3& b) { return a[axis] < b[axis]; });
+  const int first = (*low)[axis];
+  std::vector<std::uint32_t> next(static_cast<std::size_t>((*high)[axis] - first) + 1, 0);
+  for (std::size_t e = 0; e < place.size(); ++e) place[e] = next[elements.index[e][axis] - first]++;
+  return place;
+}
+
+// Leaves out elements that no cell here has; `place` goes along.
+void drop_unused(LatticeElements& elements, std::vector<std::uint32_t>& place) {
+  std::vector<std::uint32_t> number(elements.index.size(), kNoElement);
+  for (const auto& of_piece : elements.of_piece)
+    for (const std::uint32_t e : of_piece) number[e] = 0;
+  std::uint32_t next = 0;
+  for (std::size_t e = 0; e < number.size(); ++e) {
+    if (number[e] == kNoElement) continue;
+    number[e] = next;
+    elements.index[next] = elements.index[e];
+    elements.number[next] = elements.number[e];
+    place[next++] = place[e];
+  }
+  elements.index.resize(next);
+  elements.number.resize(next);
+  place.resize(next);
+  for (auto& of_piece : elements.of_piece)
+    for (std::uint32_t& e : of_piece) e = number[e];
+}
+
 AssembledPart assemble_corners(const Voxels& voxels, const Part& part, Body& body,
-                               PolygonCells& polygon_cells) {
+                               PolygonCells& polygon_cells, PartSlice* slice) {
   const auto first_element = static_cast<std::uint32_t>(body.element_count());
   const auto first_cell = static_cast<std::uint32_t>(body.cell_count());
   const auto keep = [&](const Piece& piece) { return has_cell(voxels, piece); };
   AssembledPart result = count_volumes(voxels, keep);
-  const KeptPieces kept = number_kept(voxels, keep, first_cell);
+  KeptPieces kept = number_kept(voxels, keep, first_cell);
+  if (slice != nullptr) leave_out(voxels, slice->held, first_cell, kept);
   result.cells = kept.count;
   LatticeElements elements = make_elements(voxels, kept.number, first_cell, kept.count);
+  if (slice != nullptr) {
+    std::vector<std::uint32_t> place = places_in_planes(elements, slice->axis);
+    drop_unused(elements, place);
+    slice->place.insert(slice->place.end(), place.begin(), place.end());
+  }
   result.elements = elements.index.size();
   append_elements(std::move(elements.index), std::move(elements.number), part, body);
   append_cells(voxels, kept, first_element, std::move(elements.of_piece), body);
@@ -294,12 +343,23 @@ AssembledPart assemble_centres(const Voxels& voxels, const Part& part, Body& bod
 
 }  // namespace
 
-AssembledPart assemble_part(const Voxels& voxels, const Part& part, Body& body, PolygonCells& polygon_cells) {
+void add_piece(double fill, bool kept, AssembledPart& found) {
+  constexpr double kNothing = 1e-9;  // the rim of a face that lies on a lattice plane, no sliver
+  if (kept)
+    found.volume += fill;
+  else if (std::abs(fill) > kNothing)
+    found.dropped_volume += fill;
+  found.cells += kept;
+  found.dropped_cells += !kept && fill > kNothing;
+}
+
+AssembledPart assemble_part(const Voxels& voxels, const Part& part, Body& body, PolygonCells& polygon_cells,
+                            PartSlice* slice) {
   Part placed = part;
   placed.element_begin = static_cast<std::uint32_t>(body.element_count());
   placed.cell_begin = static_cast<std::uint32_t>(body.cell_count());
   const AssembledPart result = part.placement == Placement::corner
-                                   ? assemble_corners(voxels, part, body, polygon_cells)
+                                   ? assemble_corners(voxels, part, body, polygon_cells, slice)
                                    : assemble_centres(voxels, part, body);
   placed.element_end = static_cast<std::uint32_t>(body.element_count());
   placed.cell_end = static_cast<std::uint32_t>(body.cell_count());
@@ -307,8 +367,7 @@ AssembledPart assemble_part(const Voxels& voxels, const Part& part, Body& body, 
   return result;
 }
 
-void set_surface_cells(const PolygonCells& polygon_cells, Body& body) {
-  const std::size_t polygons = body.surface.polygon_count();
+void set_surface_cells(const PolygonCells& polygon_cells, std::size_t polygons, Body& body) {
   Buckets<std::uint32_t> cells = sort_into_buckets<std::uint32_t>(polygons, [&](const auto& use) {
     for (const std::vector<PolygonCell>& list : polygon_cells)
       for (const PolygonCell& pair : list) use(pair.polygon, pair.cell);
