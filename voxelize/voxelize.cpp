@@ -469,9 +469,9 @@ void say_pieces(const SlabBodies& slabs, std::size_t pieces, Progress& progress)
     largest = std::max(largest, slabs.own_cells(index));
     all += slabs.own_cells(index);
   }
-  progress.say(fmt::format("{}, the largest with {} ({} of the mean)", counted(pieces, "piece"),
+  progress.say(fmt::format("{}, the largest with {}, {:.2f} times the mean", counted(pieces, "piece"),
                            counted(largest, "cell"),
-                           human_share(static_cast<double>(largest * pieces) / static_cast<double>(all))));
+                           static_cast<double>(largest * pieces) / static_cast<double>(all)));
 }
 
 // What the pieces are made from: those of two runs can be put together only where it is the same.

@@ -167,6 +167,7 @@ TEST(Slabs, OfTwoPartsAreCutEachAlongItsOwnAxis) {
     parts.polygon_face.push_back(other.polygon_face[p] + static_cast<std::uint32_t>(parts.faces.size()));
   }
   parts.parts.push_back({"second", ""});
+  if (!parts.part_source.empty()) parts.part_source.push_back(parts.part_source[0]);
   for (SurfaceFace face : other.faces) {
     face.part = 1;
     parts.faces.push_back(face);

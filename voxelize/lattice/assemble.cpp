@@ -231,35 +231,28 @@ void append_cells(const Voxels& voxels, const KeptPieces& kept, std::uint32_t fi
       2);
 }
 
-// (elements) Its place among all elements of its lattice plane across `axis`.
-std::vector<std::uint32_t> places_in_planes(const LatticeElements& elements, int axis) {
-  std::vector<std::uint32_t> place(elements.index.size());
-  if (elements.index.empty()) return place;
-  const auto [low, high] =
-      std::minmax_element(elements.index.begin(), elements.index.end(),
-                          [axis](const Index3& a, const Index3& b) { return a[axis] < b[axis]; });
-  const int first = (*low)[axis];
-  std::vector<std::uint32_t> next(static_cast<std::size_t>((*high)[axis] - first) + 1, 0);
-  for (std::size_t e = 0; e < place.size(); ++e) place[e] = next[elements.index[e][axis] - first]++;
-  return place;
-}
-
-// Leaves out elements that no cell here has; `place` goes along.
-void drop_unused(LatticeElements& elements, std::vector<std::uint32_t>& place) {
-  std::vector<std::uint32_t> number(elements.index.size(), kNoElement);
+// Leaves out elements that no cell here has, and numbers the others over the whole lattice.
+void drop_unused(LatticeElements& elements, PartSlice& slice) {
+  std::vector<bool> used(elements.index.size(), false);
   for (const auto& of_piece : elements.of_piece)
-    for (const std::uint32_t e : of_piece) number[e] = 0;
+    for (const std::uint32_t e : of_piece) used[e] = true;
+  std::vector<std::uint32_t> number(elements.index.size(), kNoElement);
+  std::vector<std::int64_t> next_point =
+      slice.plane_point;  // elements of a plane are numbered in their order
   std::uint32_t next = 0;
-  for (std::size_t e = 0; e < number.size(); ++e) {
-    if (number[e] == kNoElement) continue;
+  slice.points.reserve(slice.points.size() +
+                       static_cast<std::size_t>(std::count(used.begin(), used.end(), true)));
+  for (std::size_t e = 0; e < used.size(); ++e) {
+    const auto plane = static_cast<std::size_t>(elements.index[e][slice.axis] - slice.first_plane);
+    if (plane < next_point.size()) ++next_point[plane];
+    if (!used[e]) continue;
+    slice.points.push_back(next_point[plane] - 1);
     number[e] = next;
     elements.index[next] = elements.index[e];
-    elements.number[next] = elements.number[e];
-    place[next++] = place[e];
+    elements.number[next++] = elements.number[e];
   }
   elements.index.resize(next);
   elements.number.resize(next);
-  place.resize(next);
   for (auto& of_piece : elements.of_piece)
     for (std::uint32_t& e : of_piece) e = number[e];
 }
@@ -274,11 +267,7 @@ AssembledPart assemble_corners(const Voxels& voxels, const Part& part, Body& bod
   if (slice != nullptr) leave_out(voxels, slice->held, first_cell, kept);
   result.cells = kept.count;
   LatticeElements elements = make_elements(voxels, kept.number, first_cell, kept.count);
-  if (slice != nullptr) {
-    std::vector<std::uint32_t> place = places_in_planes(elements, slice->axis);
-    drop_unused(elements, place);
-    slice->place.insert(slice->place.end(), place.begin(), place.end());
-  }
+  if (slice != nullptr) drop_unused(elements, *slice);
   result.elements = elements.index.size();
   append_elements(std::move(elements.index), std::move(elements.number), part, body);
   append_cells(voxels, kept, first_element, std::move(elements.of_piece), body);

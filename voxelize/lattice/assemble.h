@@ -26,8 +26,10 @@ struct PartSlice {
   VoxelBox held;  // the voxels that become cells
   VoxelBox own;   // of them those that do in no other slice
   int axis = 0;   // the part is cut across this one
-  // Set: (elements) its place among all of its lattice plane across the axis, in order.
-  std::vector<std::uint32_t> place = {};
+  // (planes across the axis, from `first_plane`) The number of its first element over the whole lattice.
+  int first_plane = 0;
+  std::vector<std::int64_t> plane_point;
+  std::vector<std::int64_t> points;  // of each element that the body got, its number is appended
 };
 
 // Appends one part's elements (corner placement: and cells) to the body and sets the part's ranges. `part`

@@ -76,19 +76,24 @@ void SlabBodies::add_part(std::size_t p, std::uint32_t index, PieceBody& piece, 
   const SlabPart& each = parts_[p];
   const PartLayers& layers = *each.layers;
   const int begin = static_cast<int>(cut_[p][index]), end = static_cast<int>(cut_[p][index + 1]);
-  PartSlice slice{layers_of(layers, begin - 1, end + 1), layers_of(layers, begin, end), layers.axis};
-  Voxels voxels = classify_closed(
-      each.healed->mesh, {.with_moments = moments_, .box = widened(slice.held, layers.axis, kMoreLayers)});
-  if (moments_) voxels.dropped_fill = kDroppedFillWithMoments;
-  if (!layers.missing.empty()) trace_polygons(each.healed->original, layers.missing, voxels);
+  PartSlice slice{layers_of(layers, begin - 1, end + 1),
+                  layers_of(layers, begin, end),
+                  layers.axis,
+                  layers.first,
+                  plane_point_[p],
+                  std::move(piece.global_point)};
   Body& body = piece.body;
-  (void)assemble_part(voxels, each.part, body, polygon_cells, &slice);
-  if (moments_) spread = append_moments(voxels, body, &slice);
-  const Part& placed = body.parts.back();
-  for (std::uint32_t e = placed.element_begin; e < placed.element_end; ++e) {
-    const auto plane = static_cast<std::size_t>(body.lattice_index[e][layers.axis] - layers.first);
-    piece.global_point.push_back(plane_point_[p][plane] + slice.place[e - placed.element_begin]);
+  {
+    Voxels voxels = classify_closed(
+        each.healed->mesh, {.with_moments = moments_, .box = widened(slice.held, layers.axis, kMoreLayers)});
+    if (moments_) voxels.dropped_fill = kDroppedFillWithMoments;
+    if (!layers.missing.empty()) trace_polygons(each.healed->original, layers.missing, voxels);
+    (void)assemble_part(voxels, each.part, body, polygon_cells, &slice);
+    if (moments_) spread = append_moments(voxels, body, &slice);
   }
+  piece.global_point = std::move(slice.points);
+  const Part& placed = body.parts.back();
+  piece.ghost_cells.reserve(placed.cell_end);
   for (std::uint32_t c = placed.cell_begin; c < placed.cell_end; ++c) {
     const int layer = body.lattice_index[body.cell_elements[c][0]][layers.axis] - layers.first;
     piece.ghost_cells.push_back(layer < begin || layer >= end);
