@@ -1,3 +1,4 @@
+// The volume of the lattice is summed while the pieces go by.
 #include "mapping/lattice_pieces.h"
 
 #include <fmt/format.h>

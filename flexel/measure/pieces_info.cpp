@@ -1,3 +1,4 @@
+// One piece is in memory at a time.
 #include "flexel/measure/pieces_info.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// Lists are written as text and read with pugixml.
 #include "formats/vtu/pvtu.h"
 
 #include <fmt/format.h>

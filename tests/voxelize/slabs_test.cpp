@@ -24,6 +24,13 @@ struct Case {
   bool moments = false;
 };
 
+// A facet that stands off the part: healing leaves it out, and it lies over the cells beneath all the same.
+Mesh with_fin(Mesh mesh) {
+  mesh.vertices.emplace_back(4.5, -1.5, 1);
+  mesh.triangles.push_back({0, 1, static_cast<std::uint32_t>(mesh.vertices.size() - 1)});
+  return mesh;
+}
+
 // Box along each axis; curved; in two fragments with nothing between; leaves thinner than a cell; turned, so that slivers
 // are dropped and voxels hold several pieces.
 std::vector<Case> cases() {
@@ -37,6 +44,7 @@ std::vector<Case> cases() {
           {"fork", transformed(fork(.06, .03, .3, .4), turned_all), .1},
           {"leaves", transformed(fork(.06, .03, 0, .4), turned(.2, .1, 0)), .11, true},
           {"plate", transformed(box({0, 0, 0}, {9, 8, .4}), turned_all), .7},
+          {"healed", with_fin(box({0, 0, 0}, {9.3, 3, 2})), 1},
           {"shells_cross", merged(box({0, 0, 0}, {5, 2, 2}), box({4, .5, .3}, {9, 1.7, 1.2})), .6, true}};
 }
 

@@ -104,21 +104,6 @@ void append(std::vector<Value>&& from, std::vector<Value>& to) {
   to.insert(to.end(), from.begin(), from.end());
 }
 
-void append_elements(std::vector<Index3>&& index, std::vector<std::uint16_t>&& number, const Part& part,
-                     Body& body) {
-  const std::size_t first = body.rest.size(), n = index.size();
-  const Vec3 shift = Vec3::Constant(part.placement == Placement::centre ? .5 : 0);
-  append(std::move(index), body.lattice_index);
-  append(std::move(number), body.piece);
-  resize_touched(body.rest, first + n);
-  resize_touched(body.position, first + n);
-  parallel_for_each(n, [&](std::size_t e) {
-    const Index3& at = body.lattice_index[first + e];
-    body.position[first + e] = body.rest[first + e] =
-        part.lattice.to_world(Vec3(at[0], at[1], at[2]) + shift);
-  });
-}
-
 // The row of voxels (j, k) and the number of its first piece.
 struct Row {
   const Slab* slab = nullptr;
@@ -269,7 +254,9 @@ AssembledPart assemble_corners(const Voxels& voxels, const Part& part, Body& bod
   LatticeElements elements = make_elements(voxels, kept.number, first_cell, kept.count);
   if (slice != nullptr) drop_unused(elements, *slice);
   result.elements = elements.index.size();
-  append_elements(std::move(elements.index), std::move(elements.number), part, body);
+  append(std::move(elements.index), body.lattice_index);
+  append(std::move(elements.number), body.piece);
+  if (slice == nullptr) place_elements(part, body);
   append_cells(voxels, kept, first_element, std::move(elements.of_piece), body);
   const std::size_t first_list = polygon_cells.size();
   polygon_cells.resize(first_list + voxels.slabs.size());
@@ -324,13 +311,27 @@ AssembledPart assemble_centres(const Voxels& voxels, const Part& part, Body& bod
   result.volume = static_cast<double>(index.size());
   result.dropped_volume = 0;
   std::vector<std::uint16_t> pieces(index.size(), 0);
-  append_elements(std::move(index), std::move(pieces), part, body);
+  append(std::move(index), body.lattice_index);
+  append(std::move(pieces), body.piece);
+  place_elements(part, body);
   body.connections.resize(first, 0);
   body.connections.insert(body.connections.end(), connections.begin(), connections.end());
   return result;
 }
 
 }  // namespace
+
+void place_elements(const Part& part, Body& body) {
+  const std::size_t first = body.rest.size(), all = body.lattice_index.size();
+  const Vec3 shift = Vec3::Constant(part.placement == Placement::centre ? .5 : 0);
+  resize_touched(body.rest, all);
+  resize_touched(body.position, all);
+  parallel_for_each(all - first, [&](std::size_t e) {
+    const Index3& at = body.lattice_index[first + e];
+    body.position[first + e] = body.rest[first + e] =
+        part.lattice.to_world(Vec3(at[0], at[1], at[2]) + shift);
+  });
+}
 
 void add_piece(double fill, bool kept, AssembledPart& found) {
   constexpr double kNothing = 1e-9;  // the rim of a face that lies on a lattice plane, no sliver
@@ -350,7 +351,7 @@ AssembledPart assemble_part(const Voxels& voxels, const Part& part, Body& body, 
   const AssembledPart result = part.placement == Placement::corner
                                    ? assemble_corners(voxels, part, body, polygon_cells, slice)
                                    : assemble_centres(voxels, part, body);
-  placed.element_end = static_cast<std::uint32_t>(body.element_count());
+  placed.element_end = static_cast<std::uint32_t>(body.lattice_index.size());
   placed.cell_end = static_cast<std::uint32_t>(body.cell_count());
   body.parts.push_back(placed);
   return result;

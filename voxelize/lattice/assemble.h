@@ -37,6 +37,10 @@ struct PartSlice {
 AssembledPart assemble_part(const Voxels& voxels, const Part& part, Body& body, PolygonCells& polygon_cells,
                             PartSlice* slice = nullptr);
 
+// Sets rest and position of the last part's elements. assemble_part does it, but for a slice: there whoever calls it does
+// so once the voxels, which take as much memory, are gone.
+void place_elements(const Part& part, Body& body);
+
 // Fills surface_cell_offsets and surface_cells from the pairs of all parts; `polygons`: of the surface.
 void set_surface_cells(const PolygonCells& polygon_cells, std::size_t polygons, Body& body);
 

@@ -1,3 +1,5 @@
+// Blocks of rows and slabs are classified by themselves, each with the row and the slab before it, and what they hold is
+// counted.
 #include "voxelize/slabs/layers.h"
 
 #include <algorithm>

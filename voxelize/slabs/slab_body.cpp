@@ -91,6 +91,7 @@ void SlabBodies::add_part(std::size_t p, std::uint32_t index, PieceBody& piece, 
     (void)assemble_part(voxels, each.part, body, polygon_cells, &slice);
     if (moments_) spread = append_moments(voxels, body, &slice);
   }
+  place_elements(each.part, body);
   piece.global_point = std::move(slice.points);
   const Part& placed = body.parts.back();
   piece.ghost_cells.reserve(placed.cell_end);
