@@ -6,7 +6,7 @@
 
 namespace flexel::simulate {
 
-CarryingCells::CarryingCells(const ContactSurface& surface) {
+CarryingCells::CarryingCells(const ContactSurface& surface) : surface_(surface) {
   for (std::uint32_t p = 0; p < surface.body().parts.size(); ++p) {
     const std::array<Vec3, 8>& of = surface.gradients(p);
     slopes_.push_back({0.5 * (of[1] - of[0]), 0.5 * (of[2] - of[0]), 0.5 * (of[4] - of[0])});
@@ -37,8 +37,30 @@ void CarryingCells::reset(const PairList& list) {
             list.elements().begin());
       cells_.push_back(cell);
     }
-    points_[order[n]] = {static_cast<std::uint32_t>(cells_.size() - 1), point.at.weights};
+    points_[order[n]] = carried(point, surface_.broken(points[order[n]]));
+    points_[order[n]].cell = static_cast<std::uint32_t>(cells_.size() - 1);
   }
+}
+
+CarriedPoint CarryingCells::carried(const ContactPoint& point, bool broken) const {
+  CarriedPoint made{};
+  for (std::size_t a = 0; a < 8; ++a) {
+    const bool used = a < point.at.count;
+    made.weights[a] = used ? point.at.weights[a] : 0;
+    made.elements[a] = point.at.elements[used ? a : 0];
+  }
+  made.count = point.at.count;
+  for (int axis = 0; axis < 3; ++axis) {
+    made.rest[axis] = point.rest[axis];
+    made.normal[axis] = point.normal[axis];
+    for (int c = 0; c < 3 && point.at.count == 8; ++c)
+      made.slopes[3 * axis + c] = slopes_[point.part][static_cast<std::size_t>(axis)][c];
+  }
+  made.own_plane = point.shape == ContactShape::face ? 1 : 0;
+  made.radius = point.radius;
+  made.ball = point.shape == ContactShape::ball ? 1 : 0;
+  made.broken = broken ? 1 : 0;
+  return made;
 }
 
 Vec3 CarryingCells::at_point(std::uint32_t point, const std::vector<Vec3>& values) const {

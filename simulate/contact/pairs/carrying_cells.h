@@ -3,6 +3,7 @@
 // is found once.
 #pragma once
 #include "simulate/contact/pairs/pair_list.h"
+#include "simulate/kernels/kernel_contact.h"
 
 namespace flexel::simulate {
 
@@ -13,14 +14,11 @@ struct CarryingCell {
   [[nodiscard]] bool deforms() const { return count == 8; }  // else its points have no normal
 };
 
-struct CarriedPoint {
-  std::uint32_t cell = 0;
-  std::array<double, 8> weights{};
-};
+using contact_kernels::CarriedPoint;
 
 class CarryingCells {
  public:
-  explicit CarryingCells(const ContactSurface& surface);
+  explicit CarryingCells(const ContactSurface& surface);  // outlives this
 
   // To the points of a new list; those that nothing of eight corners carries get a cell each.
   void reset(const PairList& list);
@@ -43,6 +41,9 @@ class CarryingCells {
   [[nodiscard]] static std::array<Vec3, 3> differences(const CarryingCell& cell,
                                                        const std::vector<Vec3>& values);
 
+  [[nodiscard]] CarriedPoint carried(const ContactPoint& point, bool broken) const;
+
+  const ContactSurface& surface_;
   std::vector<CarryingCell> cells_;
   std::vector<CarriedPoint> points_;
   std::vector<std::array<Vec3, 3>> slopes_;  // (parts)

@@ -1,0 +1,540 @@
+// Sums run in the order in which Eigen's do, so that a pair or point that is looked at by itself has the same bits.
+#include "simulate/kernels/kernel_contact.h"
+
+#include "base/simd.h"
+
+#ifndef FLEXEL_ISA
+#error "compiled once per instruction set: simulate/CMakeLists.txt sets FLEXEL_ISA"
+#endif
+
+namespace flexel::simulate::contact_kernels {
+namespace {
+
+using simd::FourDoubles;
+using simd::LaneBits;
+using simd::LaneMask;
+using simd::Lanes;
+using simd::load;
+using simd::shuffle;
+using simd::square_root;
+using simd::store;
+
+static_assert(kLanes == simd::kLanes && sizeof(CarriedPoint) == 4 * 64);
+
+// As in ContactSurface::shape_at().
+constexpr double kLeastVolume = 0.05, kMostStretch = 25;
+// As in PairStates::pair_proximity().
+constexpr double kPoint = 1.2, kBounds = 1.5, kMostTurn = 0.3;
+
+struct Three {
+  Lanes x, y, z;
+};
+FLEXEL_INLINE Three operator+(const Three& a, const Three& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+FLEXEL_INLINE Three operator-(const Three& a, const Three& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+FLEXEL_INLINE Three operator*(const Lanes& a, const Three& b) {
+  return {a * b.x, a * b.y, a * b.z};
+}
+FLEXEL_INLINE Three operator/(const Three& a, const Lanes& b) {
+  return {a.x / b, a.y / b, a.z / b};
+}
+FLEXEL_INLINE Lanes dot(const Three& a, const Three& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+FLEXEL_INLINE Lanes pick(const LaneMask& where, const Lanes& yes, const Lanes& no) {
+  return where ? yes : no;
+}
+FLEXEL_INLINE Three pick(const LaneMask& where, const Three& yes, const Three& no) {
+  return {pick(where, yes.x, no.x), pick(where, yes.y, no.y), pick(where, yes.z, no.z)};
+}
+FLEXEL_INLINE LaneMask is_zero(const Three& a) {
+  return (a.x == 0) & (a.y == 0) & (a.z == 0);
+}
+FLEXEL_INLINE Lanes larger(const Lanes& a, const Lanes& b) {
+  return a < b ? b : a;
+}  // std::max
+FLEXEL_INLINE Lanes smaller(const Lanes& a, const Lanes& b) {
+  return b < a ? b : a;
+}  // std::min
+FLEXEL_INLINE Lanes absolute(const Lanes& a) {
+  return a < 0 ? -a : a;
+}
+
+FLEXEL_INLINE Lanes bits_of(const LaneMask& flags) {
+  Lanes made;
+  __builtin_memcpy(&made, &flags, sizeof made);
+  return made;
+}
+
+// Rows to columns and back.
+FLEXEL_INLINE void transpose(Lanes r[8]) {
+  constexpr LaneBits even = {0, 8, 2, 10, 4, 12, 6, 14}, odd = {1, 9, 3, 11, 5, 13, 7, 15};
+  constexpr LaneBits low = {0, 1, 8, 9, 4, 5, 12, 13}, high = {2, 3, 10, 11, 6, 7, 14, 15};
+  constexpr LaneBits first = {0, 1, 2, 3, 8, 9, 10, 11}, second = {4, 5, 6, 7, 12, 13, 14, 15};
+  Lanes a[8], b[8];
+#pragma GCC unroll 4
+  for (int n = 0; n < 8; n += 2) {
+    a[n] = shuffle(r[n], r[n + 1], even);
+    a[n + 1] = shuffle(r[n], r[n + 1], odd);
+  }
+#pragma GCC unroll 2
+  for (int n = 0; n < 8; n += 4) {
+    b[n] = shuffle(a[n], a[n + 2], low);
+    b[n + 1] = shuffle(a[n + 1], a[n + 3], low);
+    b[n + 2] = shuffle(a[n], a[n + 2], high);
+    b[n + 3] = shuffle(a[n + 1], a[n + 3], high);
+  }
+#pragma GCC unroll 4
+  for (int n = 0; n < 4; ++n) {
+    r[n] = shuffle(b[n], b[n + 4], first);
+    r[n + 4] = shuffle(b[n], b[n + 4], second);
+  }
+}
+
+// Of a block of eight; where there are fewer, the last one again.
+struct Block {
+  std::size_t count;
+  std::uint32_t at[kLanes];
+};
+FLEXEL_INLINE Block block_of(const std::uint32_t* which, std::size_t begin, std::size_t count) {
+  Block block;
+  block.count = count - begin < kLanes ? count - begin : kLanes;
+  for (std::size_t l = 0; l < kLanes; ++l)
+    block.at[l] = which[begin + (l < block.count ? l : block.count - 1)];
+  return block;
+}
+
+FLEXEL_INLINE FourDoubles load_three(const double* from) {
+  return FourDoubles{from[0], from[1], from[2], 0};
+}
+
+FLEXEL_INLINE void store_four(double* to, const FourDoubles& value) {
+  __builtin_memcpy(to, &value, sizeof value);
+}
+
+struct Interpolated {
+  Three value;     // at the points
+  Three along[3];  // CarryingCells::differences()
+};
+
+FLEXEL_INLINE void interpolate(const CarriedPoint* points, const Block& block, const double* values,
+                               Interpolated& made) {
+  alignas(64) double rows[kLanes][16];
+  for (std::size_t l = 0; l < kLanes; ++l) {
+    const CarriedPoint& point = points[block.at[l]];
+    FourDoubles v[8];
+    for (int a = 0; a < 8; ++a) v[a] = load_three(values + 3 * std::size_t{point.elements[a]});
+    FourDoubles sum = {};
+    for (int a = 0; a < 8; ++a) sum += point.weights[a] * v[a];
+    const FourDoubles up01 = v[1] - v[0], up23 = v[3] - v[2], up45 = v[5] - v[4], up67 = v[7] - v[6];
+    const FourDoubles sum01 = v[0] + v[1], sum23 = v[2] + v[3], sum45 = v[4] + v[5], sum67 = v[6] + v[7];
+    store_four(rows[l], sum);
+    store_four(rows[l] + 4, (up01 + up23) + (up45 + up67));
+    store_four(rows[l] + 8, (sum23 - sum01) + (sum67 - sum45));
+    store_four(rows[l] + 12, (sum45 + sum67) - (sum01 + sum23));
+  }
+  Lanes c[8];
+  for (std::size_t l = 0; l < kLanes; ++l) c[l] = load(rows[l]);
+  transpose(c);
+  made.value = {c[0], c[1], c[2]};
+  made.along[0] = {c[4], c[5], c[6]};
+  for (std::size_t l = 0; l < kLanes; ++l) c[l] = load(rows[l] + 8);
+  transpose(c);
+  made.along[1] = {c[0], c[1], c[2]};
+  made.along[2] = {c[4], c[5], c[6]};
+}
+
+struct Nine {
+  Lanes at[3][3];  // row, column
+};
+
+// sum over the axes of along (x) slope
+FLEXEL_INLINE Nine gradient(const Interpolated& values, const Three slopes[3]) {
+  Nine made;
+  const Three* d = values.along;
+  for (int j = 0; j < 3; ++j) {
+    Lanes s[3];
+    for (int k = 0; k < 3; ++k) s[k] = j == 0 ? slopes[k].x : j == 1 ? slopes[k].y : slopes[k].z;
+    made.at[0][j] = d[0].x * s[0] + d[1].x * s[1] + d[2].x * s[2];
+    made.at[1][j] = d[0].y * s[0] + d[1].y * s[1] + d[2].y * s[2];
+    made.at[2][j] = d[0].z * s[0] + d[1].z * s[1] + d[2].z * s[2];
+  }
+  return made;
+}
+
+FLEXEL_INLINE Lanes cofactor(const Nine& m, int i, int j) {
+  const int i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+  return m.at[i1][j1] * m.at[i2][j2] - m.at[i1][j2] * m.at[i2][j1];
+}
+
+// Columns of the constants of points.
+struct PointColumns {
+  Three rest, normal;
+  Lanes own_plane, radius;
+  Three slopes[3];
+  Lanes ball, broken;
+};
+
+FLEXEL_INLINE void read_points(const CarriedPoint* points, const Block& block, PointColumns& made) {
+  Lanes c[8];
+  for (std::size_t l = 0; l < kLanes; ++l) c[l] = load(points[block.at[l]].rest);
+  transpose(c);
+  made.rest = {c[0], c[1], c[2]};
+  made.normal = {c[3], c[4], c[5]};
+  made.own_plane = c[6];
+  made.radius = c[7];
+  for (std::size_t l = 0; l < kLanes; ++l) c[l] = load(points[block.at[l]].slopes);
+  transpose(c);
+  made.slopes[0] = {c[0], c[1], c[2]};
+  made.slopes[1] = {c[3], c[4], c[5]};
+  const Lanes x = c[6], y = c[7];
+  for (std::size_t l = 0; l < kLanes; ++l)
+    c[l] = load(points[block.at[l]].slopes + 8);  // and what follows them
+  transpose(c);
+  made.slopes[2] = {x, y, c[0]};
+  made.ball = c[1];
+  made.broken = c[2];
+}
+
+// ContactSurface::shape_at(): F^-1, whether there is none, and the rate.
+FLEXEL_INLINE void find_shape(Nine f, const PointColumns& point, Nine& inverse, LaneMask& shapeless,
+                              Lanes& rate) {
+  const Lanes infinite = Lanes{} + __builtin_huge_val();
+  const auto& m = f.at;
+  Lanes stretch = (m[0][0] * m[0][0] + m[1][0] * m[1][0]) + m[2][0] * m[2][0];
+  stretch += (m[0][1] * m[0][1] + m[1][1] * m[1][1]) + m[2][1] * m[2][1];
+  stretch += (m[0][2] * m[0][2] + m[1][2] * m[1][2]) + m[2][2] * m[2][2];
+  const Lanes volume = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+                       m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+                       m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+  const LaneMask is_ball = point.ball != 0;
+  shapeless = ~is_ball & ((point.broken != 0) | ~((volume > kLeastVolume) & (stretch < kMostStretch)));
+  const LaneMask given = shapeless | is_ball;
+  const Lanes first[3] = {cofactor(f, 0, 0), cofactor(f, 1, 0), cofactor(f, 2, 0)};
+  const Lanes scale = 1 / (first[0] * m[0][0] + first[1] * m[1][0] + first[2] * m[2][0]);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      inverse.at[j][i] =
+          pick(given, Lanes{} + (i == j ? 1.0 : 0.0), (j == 0 ? first[i] : cofactor(f, i, j)) * scale);
+  Lanes column = {}, row = {};
+  for (int i = 0; i < 3; ++i) {
+    const auto& v = inverse.at;
+    column = larger(column, absolute(v[0][i]) + absolute(v[1][i]) + absolute(v[2][i]));
+    row = larger(row, absolute(v[i][0]) + absolute(v[i][1]) + absolute(v[i][2]));
+  }
+  rate = pick(shapeless | (volume < 3 * kLeastVolume) | (stretch > 0.5 * kMostStretch), infinite,
+              square_root(column * row));
+  rate = pick(is_ball, Lanes{}, rate);
+}
+
+void place(const CarriedPoint* points, const std::uint32_t* which, std::size_t count,
+           const double* displacement, double* states) {
+  for (std::size_t begin = 0; begin < count; begin += kLanes) {
+    const Block block = block_of(which, begin, count);
+    Interpolated moved;
+    interpolate(points, block, displacement, moved);
+    PointColumns point;
+    read_points(points, block, point);
+    Nine f = gradient(moved, point.slopes), inverse;
+    for (int i = 0; i < 3; ++i) f.at[i][i] = 1.0 + f.at[i][i];
+    LaneMask shapeless;
+    Lanes rate;
+    find_shape(f, point, inverse, shapeless, rate);
+    const auto& v = inverse.at;
+    const Three& n = point.normal;
+    const Three turned = {v[0][0] * n.x + v[1][0] * n.y + v[2][0] * n.z,
+                          v[0][1] * n.x + v[1][1] * n.y + v[2][1] * n.z,
+                          v[0][2] * n.x + v[1][2] * n.y + v[2][2] * n.z};
+    const LaneMask none = shapeless | (point.ball != 0);
+    const Three normal =
+        pick(none, Three{Lanes{}, Lanes{}, Lanes{}}, turned / square_root(dot(turned, turned)));
+    const Three position = point.rest + moved.value;
+    const Lanes flag_bits = bits_of(shapeless & 1);
+    Lanes side[8] = {position.x,
+                     position.y,
+                     position.z,
+                     normal.x,
+                     normal.y,
+                     normal.z,
+                     pick(none, Lanes{}, point.own_plane),
+                     point.radius};
+    Lanes shape[8] = {v[0][0], v[1][0], v[2][0], v[0][1], v[1][1], v[2][1], v[0][2], v[1][2]};
+    Lanes rest[8] = {v[2][2], flag_bits, rate, Lanes{}, Lanes{}, Lanes{}, Lanes{}, Lanes{}};
+    transpose(side);
+    transpose(shape);
+    transpose(rest);
+    for (std::size_t l = 0; l < block.count; ++l) {
+      double* to = states + kPointRow * block.at[l];
+      store(to, side[l]);
+      store(to + 8, shape[l]);
+      store(to + 16, rest[l]);
+    }
+  }
+}
+
+// The two sides of eight pairs.
+struct Sides {
+  Three position[2], normal[2];
+  Lanes own_plane[2], radius[2];
+};
+
+FLEXEL_INLINE void read_sides(const PairView& pairs, const Block& block, Sides& made) {
+  Lanes i[8], j[8];
+  Lanes planes = {};
+  for (std::size_t l = 0; l < kLanes; ++l) {
+    const PairSides& of = pairs.sides[block.at[l]];
+    i[l] = load(pairs.points + kPointRow * of.i);
+    j[l] = load(of.of_plane ? pairs.planes + kSideRow * of.j : pairs.points + kPointRow * of.j);
+    planes[l] = of.of_plane;
+  }
+  transpose(i);
+  transpose(j);
+  made.position[0] = {i[0], i[1], i[2]};
+  made.normal[0] = {i[3], i[4], i[5]};
+  made.position[1] = {j[0], j[1], j[2]};
+  made.normal[1] = {j[3], j[4], j[5]};
+  const LaneMask plane = planes != 0;  // the foot on it; its normal is the exact one
+  const Lanes height = dot(made.position[0] - made.position[1], made.normal[1]);
+  made.position[1] = pick(plane, made.position[0] - height * made.normal[1], made.position[1]);
+  made.own_plane[0] = pick(plane, Lanes{}, i[6]);
+  made.own_plane[1] = j[6];
+  made.radius[0] = i[7];
+  made.radius[1] = j[7];
+}
+
+// In the order of PairConstants.
+struct Constants {
+  Lanes stiffness, width, facing_from, facing_fully, limit, soft, hard, ahead;
+};
+
+FLEXEL_INLINE Constants read_constants(const PairView& pairs, const Block& block) {
+  Lanes c[8];
+  for (std::size_t l = 0; l < kLanes; ++l)
+    c[l] = load(reinterpret_cast<const double*>(pairs.constants + pairs.stride * block.at[l]));
+  transpose(c);
+  return {c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]};
+}
+
+struct Smooth {
+  Lanes value, slope;
+};
+
+FLEXEL_INLINE Smooth kernel(const Lanes& squared, const Lanes& width) {
+  const Lanes q = 1 - squared / (width * width);
+  const Lanes scale = 3 / (3.14159265358979323846 * width * width);
+  const LaneMask flat = ~(width > 0), none = ~flat & ~(q > 0);
+  return {pick(flat, Lanes{} + 1, pick(none, Lanes{}, scale * q * q)),
+          pick(flat | none, Lanes{}, -2 * scale * q / (width * width))};
+}
+
+FLEXEL_INLINE Smooth ramp(const Lanes& at, const Lanes& from, const Lanes& to) {
+  const Lanes s = (at - from) / (to - from);
+  const LaneMask below = s <= 0, above = s >= 1;
+  return {pick(below, Lanes{}, pick(above, Lanes{} + 1, s * s * (3 - 2 * s))),
+          pick(below | above, Lanes{}, 6 * s * (1 - s) / (to - from))};
+}
+
+// Columns of PairState.
+struct Evaluated {
+  LaneMask near, deep;
+  Three normal, offset, force, turning[2];
+  Lanes gap, weight, energy, pressure, stiffness, share, along, length, narrowing, facing_slope;
+};
+
+// press() under the law of `soft` and `ahead`.
+FLEXEL_INLINE void press(Evaluated& now, const Sides& side, const Lanes& soft, const Lanes& hard,
+                         const Lanes& ahead) {
+  const Lanes depth = -now.gap, delta = depth + ahead;
+  const LaneMask inside = depth > 0, touches = delta > 0, softly = delta < soft;
+  const Lanes hardening = pick(inside, depth * depth / (hard * hard), Lanes{});
+  Lanes energy = pick(inside, 0.25 * hardening * depth * depth, Lanes{});
+  Lanes pressure = pick(inside, hardening * depth, Lanes{});
+  energy +=
+      pick(touches,
+           pick(softly, delta * delta * delta / (6 * soft), 0.5 * delta * (delta - soft) + soft * soft / 6),
+           Lanes{});
+  pressure += pick(touches, pick(softly, delta * delta / (2 * soft), delta - 0.5 * soft), Lanes{});
+  const LaneMask presses = pressure > 0;
+  now.stiffness = now.weight * pick(inside, 1 + 3 * hardening, Lanes{} + 1);
+  const Lanes share = delta / soft;
+  now.share = pick(presses, pick(share < 0, Lanes{}, pick(share > 1, Lanes{} + 1, share)), Lanes{});
+  energy = pick(presses, energy, Lanes{});
+  now.energy = now.weight * energy;
+  now.pressure = now.weight * pick(presses, pressure, Lanes{});
+  const Three none = {Lanes{}, Lanes{}, Lanes{}};
+  const Lanes spread = now.narrowing * energy;  // N/m, of t
+  now.force = pick(presses, now.pressure * now.normal + spread * now.offset, none);
+  const Three tilt = ((spread * now.along - now.pressure) / now.length) * now.offset;
+  const LaneMask tilts = presses & (now.length > 0), turns = presses & (now.facing_slope > 0);
+  now.turning[0] = pick(tilts, side.own_plane[0] * tilt, none);
+  now.turning[1] = pick(tilts, (-side.own_plane[1]) * tilt, none);
+  const Lanes turn = now.facing_slope * energy;
+  now.turning[0] = pick(turns, now.turning[0] - turn * side.normal[1], now.turning[0]);
+  now.turning[1] = pick(turns, now.turning[1] - turn * side.normal[0], now.turning[1]);
+}
+
+FLEXEL_INLINE void evaluate_block(const Sides& side, const Constants& k, const Lanes& allowed,
+                                  const Lanes& wider, Evaluated& now) {
+  const Three d = side.position[1] - side.position[0];
+  const Lanes far = larger(k.limit, k.width);
+  now.near = ~((k.width > 0) & (dot(d, d) > k.width * k.width + far * far));
+  const LaneMask faces = ~is_zero(side.normal[0]) & ~is_zero(side.normal[1]);
+  const Smooth ramped = ramp(-dot(side.normal[0], side.normal[1]), k.facing_from, k.facing_fully);
+  const Smooth facing = {pick(faces, ramped.value, Lanes{} + 1), pick(faces, ramped.slope, Lanes{})};
+  now.near &= facing.value > 0;
+  const Three b = side.own_plane[0] * side.normal[0] - side.own_plane[1] * side.normal[1];
+  const Lanes length = square_root(dot(b, b));
+  const LaneMask balls = (side.radius[0] > 0) & (side.radius[1] > 0);
+  now.near &= balls | (length > 0);
+  const Lanes distance = dot(d, d);
+  now.normal = pick(balls, pick(distance > 0, d / square_root(distance), d), b / length);
+  now.along = dot(d, now.normal);
+  now.gap = now.along - side.radius[0] - side.radius[1] + allowed;
+  now.offset = pick(balls, Three{Lanes{}, Lanes{}, Lanes{}}, d - now.along * now.normal);
+  const Smooth kern = kernel(dot(now.offset, now.offset), k.width);
+  now.near &= kern.value > 0;
+  now.deep = now.gap < -k.limit;
+  now.weight = k.stiffness * kern.value * facing.value;
+  now.length = pick(balls, Lanes{}, length);
+  now.narrowing = -2 * k.stiffness * kern.slope * facing.value;
+  now.facing_slope = k.stiffness * kern.value * facing.slope;
+  const LaneMask softens = wider > k.soft;
+  press(now, side, pick(softens, wider, k.soft), k.hard, pick(softens, 0.5 * (wider - k.soft), k.ahead));
+}
+
+// As rows; of what is not near only that, of what is deep only the gap and where it is.
+FLEXEL_INLINE void write_states(Evaluated& now, const Block& block, double* states) {
+  const LaneMask pressing = now.near & ~now.deep;
+  const Three none = {Lanes{}, Lanes{}, Lanes{}};
+  const auto kept = [&](const Lanes& value) { return pick(pressing, value, Lanes{}); };
+  const Three force = pick(pressing, now.force, none), on_i = pick(pressing, now.turning[0], none),
+              on_j = pick(pressing, now.turning[1], none), &n = now.normal, &t = now.offset;
+  const Lanes flag_bits = bits_of((now.near & 1) | (now.near & now.deep & 0x100));
+  Lanes rows[4][8] = {
+      {force.x, force.y, force.z, on_i.x, on_i.y, on_i.z, on_j.x, on_j.y},
+      {on_j.z, n.x, n.y, n.z, t.x, t.y, t.z, now.gap},
+      {kept(now.weight), kept(now.energy), kept(now.pressure), kept(now.stiffness), kept(now.share),
+       now.along, kept(now.length), kept(now.narrowing)},
+      {kept(now.facing_slope), flag_bits, Lanes{}, Lanes{}, Lanes{}, Lanes{}, Lanes{}, Lanes{}}};
+  for (auto& row : rows) transpose(row);
+  for (std::size_t l = 0; l < block.count; ++l) {
+    double* to = states + kStateRow * block.at[l];
+    for (std::size_t part = 0; part < 4; ++part) store(to + 8 * part, rows[part][l]);
+  }
+}
+
+void evaluate(const PairView& pairs, const double* allowed, const double* soft, double* states) {
+  for (std::size_t begin = 0; begin < pairs.count; begin += kLanes) {
+    const Block block = block_of(pairs.which, begin, pairs.count);
+    Lanes permitted = {}, wider = {};
+    for (std::size_t l = 0; l < block.count; ++l) {
+      permitted[l] = allowed[begin + l];
+      wider[l] = soft[begin + l];
+    }
+    Sides side;
+    read_sides(pairs, block, side);
+    Evaluated now;
+    evaluate_block(side, read_constants(pairs, block), permitted, wider, now);
+    write_states(now, block, states);
+  }
+}
+
+// PairStates::pair_proximity()
+struct Rates {
+  Lanes fastest, turning;  // the larger of both sides'; likewise of those with a plane of their own
+  LaneMask plane;
+};
+
+FLEXEL_INLINE Rates read_rates(const PairView& pairs, const Block& block, const Sides& side) {
+  Lanes i = {}, j = {}, planes = {};
+  for (std::size_t l = 0; l < kLanes; ++l) {
+    const PairSides& of = pairs.sides[block.at[l]];
+    i[l] = pairs.points[kPointRow * of.i + kNormalRate];
+    j[l] = of.of_plane ? 0 : pairs.points[kPointRow * of.j + kNormalRate];
+    planes[l] = of.of_plane;
+  }
+  return {larger(i, j),
+          larger(pick(side.own_plane[0] > 0, i, Lanes{}), pick(side.own_plane[1] > 0, j, Lanes{})),
+          planes != 0};
+}
+
+struct Safe {
+  Lanes path, turn;
+};
+
+// A gap of `margin` that shrinks with the path and by `rate` with the turn.
+FLEXEL_INLINE void bear(const LaneMask& where, const Lanes& margin, const Lanes& rate, const Lanes& fastest,
+                        Safe& found) {
+  const Lanes infinite = Lanes{} + __builtin_huge_val();
+  const LaneMask turns = rate > 0;
+  const Lanes path = pick(turns, 0.5 * margin / kPoint, margin / kPoint);
+  const Lanes turn = pick(turns, smaller(0.5 * margin / rate, kMostTurn / fastest), infinite);
+  const LaneMask better = where & (rate < infinite) & (smaller(path, turn) > smaller(found.path, found.turn));
+  found.path = pick(better, path, found.path);
+  found.turn = pick(better, turn, found.turn);
+}
+
+FLEXEL_INLINE LaneMask look_block(const Sides& side, const Constants& k, const Rates& rates,
+                                  const Lanes& pressed, Safe& found) {
+  constexpr double kRounding = 1e-9;
+  const Lanes infinite = Lanes{} + __builtin_huge_val(), &width = k.width, &fastest = rates.fastest;
+  const Three d = side.position[1] - side.position[0];
+  const Three b = side.own_plane[0] * side.normal[0] - side.own_plane[1] * side.normal[1];
+  const Lanes square = dot(d, d), distance = square_root(square), length = square_root(dot(b, b));
+  const Lanes far = larger(width, k.limit);
+  const LaneMask balls = (side.radius[0] > 0) & (side.radius[1] > 0), wide = width > 0;
+  const LaneMask directed = ~balls & (length > 0);
+  LaneMask near = balls | directed;
+  found = {Lanes{}, infinite};
+  bear(wide, distance - square_root(width * width + far * far), Lanes{}, fastest, found);
+  bear(balls, distance - side.radius[0] - side.radius[1] - pressed, Lanes{}, fastest, found);
+  const Lanes along = dot(d, b) / length;
+  const Lanes rate = pick(rates.plane, Lanes{},
+                          pick(fastest < infinite, 2 * kBounds * distance * rates.turning / length, fastest));
+  const Lanes offset2 = square - along * along;
+  bear(directed, along - side.radius[0] - side.radius[1] - pressed, rate, fastest, found);
+  near &= ~(directed & wide & (offset2 > width * width + kRounding * (width * width + square)));
+  bear(directed & wide, square_root(larger(offset2, Lanes{})) - width, 2 * rate, fastest, found);
+  const LaneMask faces = ~is_zero(side.normal[0]) & ~is_zero(side.normal[1]);
+  const Lanes facing = -dot(side.normal[0], side.normal[1]);
+  near &= ~(faces & ~(facing > k.facing_from));
+  const Lanes margin = smaller((k.facing_from - facing) / kBounds, Lanes{} + kMostTurn) / fastest;
+  const LaneMask turned =
+      faces & (fastest < infinite) & (fastest > 0) & (margin > smaller(found.path, found.turn));
+  found.path = pick(turned, infinite, found.path);
+  found.turn = pick(turned, margin, found.turn);
+  return near;
+}
+
+void look(const PairView& pairs, const double* pressed, double* path, double* turn, std::uint8_t* near) {
+  for (std::size_t begin = 0; begin < pairs.count; begin += kLanes) {
+    const Block block = block_of(pairs.which, begin, pairs.count);
+    Lanes ahead = {};
+    for (std::size_t l = 0; l < block.count; ++l) ahead[l] = pressed[begin + l];
+    Sides side;
+    read_sides(pairs, block, side);
+    Safe found;
+    const LaneMask may =
+        look_block(side, read_constants(pairs, block), read_rates(pairs, block, side), ahead, found);
+    for (std::size_t l = 0; l < block.count; ++l) {
+      path[begin + l] = found.path[l];
+      turn[begin + l] = found.turn[l];
+      near[begin + l] = may[l] != 0;
+    }
+  }
+}
+
+}  // namespace
+
+#define FLEXEL_JOIN(a, b) a##b
+#define FLEXEL_TABLE(isa) FLEXEL_JOIN(contacts_, isa)
+
+const ContactTable& FLEXEL_TABLE(FLEXEL_ISA)() {
+  static constexpr ContactTable table = {&place, &look, &evaluate};
+  return table;
+}
+
+}  // namespace flexel::simulate::contact_kernels
