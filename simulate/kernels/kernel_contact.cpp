@@ -23,7 +23,6 @@ static_assert(kLanes == simd::kLanes && sizeof(CarriedPoint) == 4 * 64);
 
 // As in ContactSurface::shape_at().
 constexpr double kLeastVolume = 0.05, kMostStretch = 25;
-// As in PairStates::pair_proximity().
 constexpr double kPoint = 1.2, kBounds = 1.5, kMostTurn = 0.3;
 
 struct Three {
@@ -50,6 +49,10 @@ FLEXEL_INLINE Lanes pick(const LaneMask& where, const Lanes& yes, const Lanes& n
 FLEXEL_INLINE Three pick(const LaneMask& where, const Three& yes, const Three& no) {
   return {pick(where, yes.x, no.x), pick(where, yes.y, no.y), pick(where, yes.z, no.z)};
 }
+// Of row i of a product of a 3 x 3 matrix: Eigen adds two rows together, and the third from its end.
+FLEXEL_INLINE Lanes row_sum(int i, const Lanes& x, const Lanes& y, const Lanes& z) {
+  return i == 2 ? x + (y + z) : x + y + z;
+}
 FLEXEL_INLINE LaneMask is_zero(const Three& a) {
   return (a.x == 0) & (a.y == 0) & (a.z == 0);
 }
@@ -67,6 +70,13 @@ FLEXEL_INLINE Lanes bits_of(const LaneMask& flags) {
   Lanes made;
   __builtin_memcpy(&made, &flags, sizeof made);
   return made;
+}
+
+// Of a bool in a row, whose other bytes are anything.
+FLEXEL_INLINE LaneMask is_flagged(const Lanes& value) {
+  LaneMask bits;
+  __builtin_memcpy(&bits, &value, sizeof bits);
+  return (bits & 0xff) != 0;
 }
 
 // Rows to columns and back.
@@ -109,6 +119,13 @@ FLEXEL_INLINE Block block_of(const std::uint32_t* which, std::size_t begin, std:
 
 FLEXEL_INLINE FourDoubles load_three(const double* from) {
   return FourDoubles{from[0], from[1], from[2], 0};
+}
+
+FLEXEL_INLINE void store_three(double* to, const FourDoubles& value) {
+  using TwoDoubles = double __attribute__((vector_size(16)));
+  const TwoDoubles two = {value[0], value[1]};
+  __builtin_memcpy(to, &two, sizeof two);
+  to[2] = value[2];
 }
 
 FLEXEL_INLINE void store_four(double* to, const FourDoubles& value) {
@@ -442,7 +459,11 @@ void evaluate(const PairView& pairs, const double* allowed, const double* soft, 
   }
 }
 
-// PairStates::pair_proximity()
+// When a pair can press at the earliest, in the terms of simulate/contact/pairs/pair_law.h. Beside a common way points
+// go by at most kPoint times their bodies' paths; normals change by at most |F^-1| times their bodies' turns, and the
+// direction of contact, the mean of both, by twice the larger of these over its length. Gap, offset and facing change
+// accordingly; half of what there is may be used up by either. kBounds covers that F^-1 changes meanwhile, by turns up
+// to kMostTurn over it: integral of dx / (1 - x) < kBounds x. What has no sure normal is known by its distance alone.
 struct Rates {
   Lanes fastest, turning;  // the larger of both sides'; likewise of those with a plane of their own
   LaneMask plane;
@@ -527,13 +548,241 @@ void look(const PairView& pairs, const double* pressed, double* path, double* tu
   }
 }
 
+// What a state knows of the cells of points.
+FLEXEL_INLINE Nine read_inverse(const double* states, const Block& block) {
+  Lanes c[8];
+  Nine made;
+  for (std::size_t l = 0; l < kLanes; ++l) c[l] = load(states + kPointRow * block.at[l] + kInverse);
+  transpose(c);
+  for (int n = 0; n < 8; ++n) made.at[n % 3][n / 3] = c[n];
+  Lanes last = {};
+  for (std::size_t l = 0; l < kLanes; ++l) last[l] = states[kPointRow * block.at[l] + kInverse + 8];
+  made.at[2][2] = last;
+  return made;
+}
+
+void move(const CarriedPoint* points, const std::uint32_t* which, std::size_t count, const double* velocity,
+          const double* states, double* motions) {
+  for (std::size_t begin = 0; begin < count; begin += kLanes) {
+    const Block block = block_of(which, begin, count);
+    Interpolated moves;
+    interpolate(points, block, velocity, moves);
+    PointColumns point;
+    read_points(points, block, point);
+    const Nine rate = gradient(moves, point.slopes), inverse = read_inverse(states, block);
+    Lanes g[9];
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j)
+        g[i + 3 * j] = row_sum(i, rate.at[i][0] * inverse.at[0][j], rate.at[i][1] * inverse.at[1][j],
+                               rate.at[i][2] * inverse.at[2][j]);
+    Lanes first[8] = {moves.value.x, moves.value.y, moves.value.z, g[0], g[1], g[2], g[3], g[4]};
+    Lanes second[8] = {g[5], g[6], g[7], g[8], Lanes{}, Lanes{}, Lanes{}, Lanes{}};
+    transpose(first);
+    transpose(second);
+    for (std::size_t l = 0; l < block.count; ++l) {
+      double* to = motions + kMotionRow * block.at[l];
+      store(to, first[l]);
+      store(to + 8, second[l]);
+    }
+  }
+}
+
+// Where two points meet, from each of them: share d, (share - 1) d; on a plane at the point.
+struct Meeting {
+  Three d;
+  Lanes share;
+  LaneMask plane;
+};
+
+FLEXEL_INLINE Meeting read_meeting(const PairView& pairs, const Block& block) {
+  Lanes i[8], j[8], planes = {}, shapeless_i = {}, shapeless_j = {};
+  for (std::size_t l = 0; l < kLanes; ++l) {
+    const PairSides& of = pairs.sides[block.at[l]];
+    const double *row_i = pairs.points + kPointRow * of.i,
+                 *row_j = of.of_plane ? row_i : pairs.points + kPointRow * of.j;
+    i[l] = load(row_i);
+    j[l] = load(row_j);
+    planes[l] = of.of_plane;
+    shapeless_i[l] = row_i[kShapeless];
+    shapeless_j[l] = row_j[kShapeless];
+  }
+  transpose(i);
+  transpose(j);
+  const LaneMask centred_i = (i[7] > 0) | is_flagged(shapeless_i),
+                 centred_j = (j[7] > 0) | is_flagged(shapeless_j);
+  const Three zero = {Lanes{}, Lanes{}, Lanes{}};
+  const LaneMask plane = planes != 0;
+  return {pick(plane, zero, Three{j[0] - i[0], j[1] - i[1], j[2] - i[2]}),
+          pick(centred_i == centred_j, Lanes{} + 0.5, pick(centred_i, Lanes{}, Lanes{} + 1)), plane};
+}
+
+FLEXEL_INLINE Three velocity_at(const double* motions, const std::uint32_t at[kLanes], const Three& away) {
+  Lanes a[8], b[8];
+  for (std::size_t l = 0; l < kLanes; ++l) {
+    a[l] = load(motions + kMotionRow * at[l]);
+    b[l] = load(motions + kMotionRow * at[l] + 8);
+  }
+  transpose(a);
+  transpose(b);
+  return {a[0] + (a[3] * away.x + a[6] * away.y + b[1] * away.z),
+          a[1] + (a[4] * away.x + a[7] * away.y + b[2] * away.z),
+          a[2] + row_sum(2, a[5] * away.x, b[0] * away.y, b[3] * away.z)};
+}
+
+// m/s, of j against i where they meet.
+FLEXEL_INLINE Three relative_velocity(const PairView& pairs, const Block& block, const Meeting& meeting,
+                                      const double* motions) {
+  std::uint32_t i[kLanes], j[kLanes];
+  for (std::size_t l = 0; l < kLanes; ++l) {
+    const PairSides& of = pairs.sides[block.at[l]];
+    i[l] = of.i;
+    j[l] = of.of_plane ? of.i : of.j;
+  }
+  const Three of_i = velocity_at(motions, i, meeting.share * meeting.d);
+  const Three of_j = velocity_at(motions, j, (meeting.share - 1) * meeting.d);
+  return pick(meeting.plane, Three{-of_i.x, -of_i.y, -of_i.z}, of_j - of_i);
+}
+
+FLEXEL_INLINE Three at_most(const Three& value, const Lanes& most) {
+  const Lanes norm = square_root(dot(value, value));
+  return pick(norm > most, (most / norm) * value, value);
+}
+
+// What friction needs of the states and records of pairs.
+struct RubbingColumns {
+  Three normal, slip;
+  Lanes gap, weight, pressure, stiffness, share;
+};
+
+FLEXEL_INLINE RubbingColumns read_rubbing(const Block& block, const double* states, const double* records) {
+  Lanes a[8], b[8], c[8];
+  for (std::size_t l = 0; l < kLanes; ++l) {
+    a[l] = load(states + kStateRow * block.at[l] + 8);
+    b[l] = load(states + kStateRow * block.at[l] + 16);
+    c[l] = load(records + kRecordRow * block.at[l]);
+  }
+  transpose(a);
+  transpose(b);
+  transpose(c);
+  return {{a[1], a[2], a[3]}, {c[1], c[2], c[3]}, a[7], b[0], b[2], b[3], b[4]};
+}
+
+// As in contact_friction.h.
+constexpr double kTangential = 0.8;
+
+void rub(const PairView& pairs, const Rubbing& with, const double* friction, double* rubbing) {
+  for (std::size_t begin = 0; begin < pairs.count; begin += kLanes) {
+    const Block block = block_of(pairs.which, begin, pairs.count);
+    Lanes mu = {};
+    for (std::size_t l = 0; l < block.count; ++l) mu[l] = friction[begin + l];
+    const RubbingColumns now = read_rubbing(block, with.states, with.records);
+    const Meeting meeting = read_meeting(pairs, block);
+    Three velocity = {Lanes{}, Lanes{}, Lanes{}}, slip = now.slip;
+    if (with.damping > 0 || with.drift >= 0)
+      velocity = relative_velocity(pairs, block, meeting, with.motions);
+    const Lanes secant = larger(pick(now.share < 1, Lanes{}, now.pressure / -now.gap), now.weight);
+    const Lanes most = mu * now.pressure;
+    const Three zero = {Lanes{}, Lanes{}, Lanes{}};
+    const LaneMask presses = now.pressure > 0;
+    if (with.drift >= 0) {
+      slip = slip + (Lanes{} + with.drift) * velocity;
+      slip = slip - dot(slip, now.normal) * now.normal;
+      slip = pick(presses & (mu > 0), at_most(slip, most / (kTangential * secant)), zero);
+    }
+    if (!(with.damping > 0)) velocity = zero;
+    const Lanes separating = dot(velocity, now.normal);
+    const Lanes along = larger(-with.damping * now.stiffness * now.share * separating, -now.pressure);
+    const Three held = slip + (Lanes{} + with.damping) * (velocity - separating * now.normal);
+    const Three force =
+        pick(presses, along * now.normal - at_most((kTangential * secant) * held, most), zero);
+    Lanes rows[8] = {force.x,     force.y,     force.z,       meeting.d.x,
+                     meeting.d.y, meeting.d.z, meeting.share, Lanes{}};
+    Lanes slips[8] = {slip.x, slip.y, slip.z, Lanes{}, Lanes{}, Lanes{}, Lanes{}, Lanes{}};
+    transpose(rows);
+    transpose(slips);
+    for (std::size_t l = 0; l < block.count; ++l) {
+      store(rubbing + kRubbingRow * (begin + l), rows[l]);
+      if (with.drift >= 0)
+        __builtin_memcpy(with.records + kRecordRow * block.at[l] + 1, &slips[l], 3 * sizeof(double));
+    }
+  }
+}
+
+// ContactLoads::on_elements(), summed.
+FLEXEL_INLINE void add_to_elements(const CarriedPoint& point, const double* row, double* forces) {
+  FourDoubles f, x, y, z, on[8];
+  __builtin_memcpy(&f, row, sizeof f);
+  __builtin_memcpy(&x, row + 4, sizeof x);
+  __builtin_memcpy(&y, row + 8, sizeof y);
+  __builtin_memcpy(&z, row + 12, sizeof z);
+  for (int a = 0; a < 8; ++a) on[a] = point.weights[a] * f;
+  const FourDoubles sum = x + y, difference = x - y;
+  if (point.count == 8) {
+    on[0] -= sum + z, on[1] += difference - z, on[2] -= difference + z, on[3] += sum - z;
+    on[4] += z - sum, on[5] += difference + z, on[6] += z - difference, on[7] += sum + z;
+  }
+  for (std::uint32_t a = 0; a < point.count; ++a) {
+    double* to = forces + 3 * std::size_t{point.elements[a]};
+    store_three(to, load_three(to) + on[a]);
+  }
+}
+
+void spread(const CarriedPoint* points, const double* states, const std::uint32_t* which, std::size_t count,
+            const double* loads, double* forces) {
+  for (std::size_t begin = 0; begin < count; begin += kLanes) {
+    const Block block = block_of(which, begin, count);
+    Lanes a[8], b[8], c[8];
+    for (std::size_t l = 0; l < kLanes; ++l) {
+      const double* row = loads + kLoadRow * (begin + (l < block.count ? l : block.count - 1));
+      a[l] = load(row);
+      b[l] = load(row + 8);
+      c[l] = load(states + kPointRow * block.at[l]);
+    }
+    transpose(a);
+    transpose(b);
+    transpose(c);
+    const Three turning = {a[3], a[4], a[5]}, normal = {c[3], c[4], c[5]};
+    const Lanes couple[3][3] = {{a[6], b[1], b[4]}, {a[7], b[2], b[5]}, {b[0], b[3], b[6]}};
+    PointColumns point;
+    read_points(points, block, point);
+    const Nine inverse = read_inverse(states, block);
+    const auto& v = inverse.at;
+    const Three across = turning - dot(turning, normal) * normal;
+    const Lanes turned[3] = {v[0][0] * across.x + v[0][1] * across.y + v[0][2] * across.z,
+                             v[1][0] * across.x + v[1][1] * across.y + v[1][2] * across.z,
+                             row_sum(2, v[2][0] * across.x, v[2][1] * across.y, v[2][2] * across.z)};
+    Lanes on[3][3];  // component, axis
+    const Lanes n[3] = {normal.x, normal.y, normal.z};
+    for (int i = 0; i < 3; ++i) {
+      Three row;
+      Lanes* to[3] = {&row.x, &row.y, &row.z};
+      for (int j = 0; j < 3; ++j)
+        *to[j] = n[i] * turned[j] +
+                 row_sum(i, couple[i][0] * v[j][0], couple[i][1] * v[j][1], couple[i][2] * v[j][2]);
+      for (int k = 0; k < 3; ++k)
+        on[i][k] =
+            row_sum(i, row.x * point.slopes[k].x, row.y * point.slopes[k].y, row.z * point.slopes[k].z);
+    }
+    Lanes first[8] = {a[0], a[1], a[2], Lanes{}, on[0][0], on[1][0], on[2][0], Lanes{}};
+    Lanes second[8] = {on[0][1], on[1][1], on[2][1], Lanes{}, on[0][2], on[1][2], on[2][2], Lanes{}};
+    transpose(first);
+    transpose(second);
+    for (std::size_t l = 0; l < block.count; ++l) {
+      alignas(64) double row[16];
+      store(row, first[l]);
+      store(row + 8, second[l]);
+      add_to_elements(points[block.at[l]], row, forces);
+    }
+  }
+}
+
 }  // namespace
 
 #define FLEXEL_JOIN(a, b) a##b
 #define FLEXEL_TABLE(isa) FLEXEL_JOIN(contacts_, isa)
 
 const ContactTable& FLEXEL_TABLE(FLEXEL_ISA)() {
-  static constexpr ContactTable table = {&place, &look, &evaluate};
+  static constexpr ContactTable table = {&place, &look, &evaluate, &move, &rub, &spread};
   return table;
 }
 

@@ -29,6 +29,10 @@ constexpr std::size_t kSideRow = 8;    // ContactSide: position, normal, own_pla
 constexpr std::size_t kInverse = 8, kShapeless = 17, kNormalRate = 18;
 constexpr std::size_t kConstantsRow = 8;  // PairConstants
 constexpr std::size_t kStateRow = 32;     // PairState
+constexpr std::size_t kRecordRow = 8;     // PairRecord
+constexpr std::size_t kMotionRow = 16;    // PointMotion
+constexpr std::size_t kRubbingRow = 8;    // PairRubbing
+constexpr std::size_t kLoadRow = 16;      // PointLoad
 
 // Two points, or a point and a plane.
 struct PairSides {
@@ -51,18 +55,41 @@ struct PairView {
 // The state of points `which` [count], to their rows of `states`.
 using PlacePoints = void (*)(const CarriedPoint* points, const std::uint32_t* which, std::size_t count,
                              const double* displacement, double* states);
-// PairStates::PairProximity of PairView::which, but for what is watched: m and turns that it can bear, and whether
-// it is near; `pressed` [m]: the gap at which it begins to press (count).
+// Of PairView::which: m and turns (BodyMotion) that it can bear before it presses, and 0 where it is not near for
+// certain, beyond the kernel or turned away; `pressed` [m]: the gap at which it begins to press (count).
 using LookAtPairs = void (*)(const PairView& pairs, const double* pressed, double* path, double* turn,
                              std::uint8_t* near);
 // pair_state() of PairView::which, to their rows of `states`; `allowed`, `soft` [m] (count).
 using EvaluatePairs = void (*)(const PairView& pairs, const double* allowed, const double* soft,
                                double* states);
 
+// PointMotion of points `which` [count], from their rows of `states`, to their rows of `motions`.
+using MovePoints = void (*)(const CarriedPoint* points, const std::uint32_t* which, std::size_t count,
+                            const double* velocity, const double* states, double* motions);
+
+// Of ContactFriction: tau [s]; `drift` [s] of the step that is finished, where the slips in `records` are to be brought
+// up to date by it, or negative.
+struct Rubbing {
+  double damping, drift;
+  const double *states, *motions;
+  double* records;
+};
+// Friction and damping of pairs that do not stick, one after another to `rubbing` (PairView::count rows); `friction`: mu
+// (count).
+using RubPairs = void (*)(const PairView& pairs, const Rubbing& with, const double* friction,
+                          double* rubbing);
+
+// Adds `loads` (count rows) of points `which` [count] to `forces` (elements x 3) [N].
+using SpreadLoads = void (*)(const CarriedPoint* points, const double* states, const std::uint32_t* which,
+                             std::size_t count, const double* loads, double* forces);
+
 struct ContactTable {
   PlacePoints place;
   LookAtPairs look;
   EvaluatePairs evaluate;
+  MovePoints move;
+  RubPairs rub;
+  SpreadLoads spread;
 };
 
 [[nodiscard]] const ContactTable& contacts_portable();

@@ -63,27 +63,12 @@ CarriedPoint CarryingCells::carried(const ContactPoint& point, bool broken) cons
   return made;
 }
 
-Vec3 CarryingCells::at_point(std::uint32_t point, const std::vector<Vec3>& values) const {
-  const CarriedPoint& of = points_[point];
-  const CarryingCell& cell = cells_[of.cell];
-  Vec3 sum = Vec3::Zero();
-  for (std::uint32_t a = 0; a < cell.count; ++a) sum += of.weights[a] * values[cell.corners[a]];
-  return sum;
-}
-
 std::array<Vec3, 3> CarryingCells::differences(const CarryingCell& cell, const std::vector<Vec3>& values) {
   const auto at = [&](std::size_t a) -> const Vec3& { return values[cell.corners[a]]; };
   const Vec3 up01 = at(1) - at(0), up23 = at(3) - at(2), up45 = at(5) - at(4), up67 = at(7) - at(6);
   const Vec3 sum01 = at(0) + at(1), sum23 = at(2) + at(3), sum45 = at(4) + at(5), sum67 = at(6) + at(7);
   return {(up01 + up23) + (up45 + up67), (sum23 - sum01) + (sum67 - sum45),
           (sum45 + sum67) - (sum01 + sum23)};
-}
-
-Mat3 CarryingCells::gradient(std::uint32_t cell, const std::vector<Vec3>& values) const {
-  const std::array<Vec3, 3> along = differences(cells_[cell], values);
-  const std::array<Vec3, 3>& slopes = slopes_[cells_[cell].part];
-  return along[0] * slopes[0].transpose() + along[1] * slopes[1].transpose() +
-         along[2] * slopes[2].transpose();
 }
 
 // The axes are square to one another.

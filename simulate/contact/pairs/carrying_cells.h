@@ -29,11 +29,8 @@ class CarryingCells {
   // signs of a.
   [[nodiscard]] const std::array<Vec3, 3>& slopes(std::uint32_t part) const { return slopes_[part]; }
 
-  // `values`: (PairList::elements()).
-  [[nodiscard]] Vec3 at_point(std::uint32_t point, const std::vector<Vec3>& values) const;
-  // Of a cell that deforms, by the places at rest: the mean over it.
-  [[nodiscard]] Mat3 gradient(std::uint32_t cell, const std::vector<Vec3>& values) const;
-  // Its norm.
+  // Norm of the gradient of `values` (PairList::elements()) in a cell that deforms, by the places at rest: the mean
+  // over it.
   [[nodiscard]] double gradient_norm(const CarryingCell& cell, const std::vector<Vec3>& values) const;
 
  private:

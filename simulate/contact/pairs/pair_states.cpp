@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <cstddef>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -21,7 +21,14 @@ constexpr double kHardened = 1.01;     // of the least softness, at which that i
 constexpr double kNoTurn = 1e-9;       // of a body in a step
 constexpr double kShapelessEntry = 0.05;  // spacings; most penetration with which shapeless points approach
 
-const contact_kernels::ContactTable& kernels() {
+static_assert(sizeof(ContactSide) == sizeof(double) * contact_kernels::kSideRow &&
+              sizeof(PointState) == sizeof(double) * contact_kernels::kPointRow &&
+              sizeof(PairConstants) == sizeof(double) * contact_kernels::kConstantsRow &&
+              sizeof(PairState) == sizeof(double) * contact_kernels::kStateRow);
+
+}  // namespace
+
+const contact_kernels::ContactTable& contact_kernel_table() {
   using namespace contact_kernels;
 #if defined(__x86_64__)
   static const ContactTable& best = best_table(&contacts_portable, &contacts_avx2, &contacts_avx512);
@@ -30,13 +37,6 @@ const contact_kernels::ContactTable& kernels() {
   return contacts_portable();
 #endif
 }
-
-static_assert(sizeof(ContactSide) == sizeof(double) * contact_kernels::kSideRow &&
-              sizeof(PointState) == sizeof(double) * contact_kernels::kPointRow &&
-              sizeof(PairConstants) == sizeof(double) * contact_kernels::kConstantsRow &&
-              sizeof(PairState) == sizeof(double) * contact_kernels::kStateRow);
-
-}  // namespace
 
 PairStates::PairStates(const ContactSettings& settings, const ContactSurface& surface, const PairList& list,
                        PairMemory& memory, OverlapRelease& release)
@@ -153,7 +153,8 @@ void PairStates::update(const State& state, bool all) {
 void PairStates::find_points(const State& state) {
   wanted_points_.clear();
   const auto want = [&](std::uint32_t point) {
-    if (std::exchange(point_evaluation_[point], evaluations_) != evaluations_) wanted_points_.push_back(point);
+    if (std::exchange(point_evaluation_[point], evaluations_) != evaluations_)
+      wanted_points_.push_back(point);
   };
   for (const std::uint32_t p : schedule_.awake()) {
     const contact_kernels::PairSides& of = sides_[p];
@@ -162,8 +163,9 @@ void PairStates::find_points(const State& state) {
   }
   if (points_.empty()) return;
   parallel_chunks(wanted_points_.size(), Batch::kMost, [&](std::size_t begin, std::size_t end) {
-    kernels().place(cells_.points().data(), wanted_points_.data() + begin, end - begin,
-                    state.displacement.data()->data(), reinterpret_cast<double*>(points_.data()));
+    contact_kernel_table().place(cells_.points().data(), wanted_points_.data() + begin, end - begin,
+                                 state.displacement.data()->data(),
+                                 reinterpret_cast<double*>(points_.data()));
   });
 }
 
@@ -218,13 +220,15 @@ void PairStates::look_at(std::span<const std::uint32_t> pairs, Batch& batch) {
     pressed[n] = of.constants.law.softened(memory_[pairs[n]].soft).ahead +
                  (of.pull_off > 0 ? of.constants.law.soft : 0);
   }
-  kernels().look(view(pairs.data(), pairs.size()), pressed.data(), path.data(), turn.data(), near.data());
+  contact_kernel_table().look(view(pairs.data(), pairs.size()), pressed.data(), path.data(), turn.data(),
+                              near.data());
   for (std::size_t n = 0; n < pairs.size(); ++n) {
     const std::uint32_t p = pairs[n];
     PairRecord& record = memory_[p];
     // what sticks pulls, and what was inside must be seen to come out
     const bool watched = record.sticks() || record.phase == PairPhase::penetrated;
-    const bool sleeps = schedule_.sleep(p, watched && near[n] ? SafeMotion{0, 0} : SafeMotion{path[n], turn[n]});
+    const bool sleeps =
+        schedule_.sleep(p, watched && near[n] ? SafeMotion{0, 0} : SafeMotion{path[n], turn[n]});
     if (near[n] && (!sleeps || evaluated_all_)) {
       add_to(batch, p);
     } else if (!frozen_) {
@@ -236,8 +240,8 @@ void PairStates::look_at(std::span<const std::uint32_t> pairs, Batch& batch) {
 
 void PairStates::evaluate_batch(const Batch& batch, std::vector<std::uint8_t>& entering) {
   if (batch.count == 0) return;
-  kernels().evaluate(view(batch.pairs.data(), batch.count), batch.allowed.data(), batch.soft.data(),
-                     reinterpret_cast<double*>(states_.data()));
+  contact_kernel_table().evaluate(view(batch.pairs.data(), batch.count), batch.allowed.data(),
+                                  batch.soft.data(), reinterpret_cast<double*>(states_.data()));
   for (std::size_t n = 0; n < batch.count; ++n) {
     const std::uint32_t p = batch.pairs[n];
     const PairState& now = states_[p];

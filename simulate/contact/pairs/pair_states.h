@@ -8,6 +8,8 @@
 
 namespace flexel::simulate {
 
+[[nodiscard]] const contact_kernels::ContactTable& contact_kernel_table();  // of this machine
+
 class PairStates {
  public:
   // All outlive this. The phases of pairs are kept in `memory`, where initial penetrations are entered too.
@@ -45,7 +47,9 @@ class PairStates {
   [[nodiscard]] const PairState& operator[](std::size_t pair) const { return states_[pair]; }
   // Evaluated pairs whose state is `near`, ascending: most candidates are not.
   [[nodiscard]] const std::vector<std::uint32_t>& active() const { return active_; }
+  [[nodiscard]] const std::vector<contact_kernels::PairSides>& sides() const { return sides_; }  // (pairs)
   [[nodiscard]] bool is_active(std::size_t pair) const { return is_active_[pair] != 0; }
+  [[nodiscard]] contact_kernels::PairView view(const std::uint32_t* pairs, std::size_t count) const;
 
  private:
   [[nodiscard]] std::span<const BodyMotion> motion_to(const State& state);
@@ -58,7 +62,6 @@ class PairStates {
     std::array<double, kMost> allowed, soft;
     std::size_t count = 0;
   };
-  [[nodiscard]] contact_kernels::PairView view(const std::uint32_t* pairs, std::size_t count) const;
   void look_at(std::span<const std::uint32_t> pairs, Batch& batch);
   void add_to(Batch& batch, std::uint32_t pair) const;
   void evaluate_batch(const Batch& batch, std::vector<std::uint8_t>& entering);
@@ -88,8 +91,8 @@ class PairStates {
   std::vector<ContactSide> planes_;                // (settings_.planes)
   std::vector<std::uint32_t> wanted_points_;       // of the evaluation
   std::vector<PointState> points_;                 // of pairs that are awake
-  std::vector<std::uint64_t> point_evaluation_;              // (points_) that they are of
-  std::vector<PairState> states_;                            // of active pairs
+  std::vector<std::uint64_t> point_evaluation_;    // (points_) that they are of
+  std::vector<PairState> states_;                  // of active pairs
   std::vector<std::uint32_t> active_;
   static constexpr std::uint8_t kWasPressed = 2;  // in the evaluation before, while pairs are evaluated
   std::vector<std::uint8_t> is_active_;           // (pairs)
