@@ -9,6 +9,10 @@
 // though the forces are all but balanced, the part buckles, and symmetry keeps Newton's method on the branch
 // that is not stable any more. There a small, smooth push to a side starts steps that lower the energy; what
 // they end in is an equilibrium like any other, without the push.
+//
+// Free strain acts whole in every load step. Where the first attempt fails, the run begins again with free strain
+// that grows with the load, by full steps down to a thirty-second. Where that comes to a bifurcation, it begins for
+// the last time, whole: so a part that heat would buckle keeps to its branch, and the caller warns of it.
 #include "simulate/equilibrium/equilibrium.h"
 
 #include <fmt/format.h>
@@ -86,6 +90,22 @@ void restore_followers(Mechanics& mechanics, const FollowerMemory& memory) {
     if (effect->follows() && next < memory.size()) effect->restore(memory[next++]);
 }
 
+// What a run begins from, once more where free strain is to act otherwise.
+struct RunBeginning {
+  std::vector<Vec3> displacement;  // m (elements)
+  FollowerMemory followers;
+  std::vector<RigidLink> links;
+};
+
+// How free strain acts in the load steps.
+enum class FreeStrainMode { whole, growing, whole_again };
+
+void restore_links(const Constraints& constraints, const std::vector<RigidLink>& links) {
+  auto link = links.begin();
+  for (const Motion& motion : constraints.motions)
+    if (motion.link) *motion.link = *link++;
+}
+
 // A run over load steps.
 class LoadStepping {
  public:
@@ -96,6 +116,7 @@ class LoadStepping {
         settings_(settings),
         progress_(progress),
         start_(start),
+        beginning_{state.displacement, follower_memory(mechanics), links_now(mechanics.constraints())},
         first_(1.0 / std::max(settings.load_steps, least_load_steps(mechanics))),
         length_(first_) {
     indented_ = find_indenters(mechanics.effects()) != nullptr;
@@ -122,6 +143,9 @@ class LoadStepping {
     return reach_ > (mechanics_.follows() ? kOutOfProportion : kOverload) *
                         bounding_box(mechanics_.body().rest).diagonal();
   }
+  // After an attempt: begins again with free strain in the next mode, where its time has come.
+  bool change_free_strain();
+  void begin_again(FreeStrainMode mode);
   [[nodiscard]] int iterations_left() const;
   // Beyond this only a mistake puts the first linear answer [m]; infinite where the scene says how to go on.
   [[nodiscard]] double out_of_proportion() const;
@@ -133,6 +157,7 @@ class LoadStepping {
   const RunSettings& settings_;
   Progress& progress_;
   const CoarseStart& start_;
+  const RunBeginning beginning_;
   double first_;  // share of the load: the first step; none is longer
   LoadStepLength length_;
   double done_ = 0;                  // share of the load
@@ -144,8 +169,9 @@ class LoadStepping {
   double hopeless_reach_ = std::numeric_limits<double>::infinity();  // m, likewise, for the whole load
   double reach_ = 0;               // m: of the first linear answer, for the whole load
   std::optional<NearStart> near_;  // where the next attempt starts in place of `state_`
-  int spent_near_ = 0;             // iterations of an attempt from there that came to nothing
-  bool pushed_ = false;            // the next attempt starts beside the last equilibrium
+  int spent_ = 0;                  // iterations from there, or in earlier modes of free strain, that came to nothing
+  FreeStrainMode free_strain_ = FreeStrainMode::whole;
+  bool pushed_ = false;  // the next attempt starts beside the last equilibrium
   int pushes_ = 0;
   double least_residual_ = 1;  // relative, of the attempts since the last equilibrium
   bool indented_ = false;  // a whole step is no good where what touches changes, and the energy tells the way
@@ -157,7 +183,7 @@ int LoadStepping::iterations_left() const {
   const int usual = indented_ ? kIndentedIterations : kIterations;
   const int allowed = settings_.newton_iterations.value_or(overloaded() ? kOverloadIterations : usual);
   const int more = indented_ ? kIterationsPerIndentedStep : kIterationsPerLoadStep;
-  return allowed + more * result_.load_steps + kPushedIterations * pushes_ + spent_near_ -
+  return allowed + more * result_.load_steps + kPushedIterations * pushes_ + spent_ -
          result_.newton_iterations;
 }
 
@@ -240,9 +266,7 @@ void LoadStepping::refuse_gone_through(const std::vector<RigidLink>& links_befor
   outcome_.converged = false;
   outcome_.relative_residual = 1;
   outcome_.trouble = fmt::format("the part goes through indenter \"{}\"", name);
-  auto link = links_before.begin();
-  for (const Motion& motion : mechanics_.constraints().motions)
-    if (motion.link) *motion.link = *link++;
+  restore_links(mechanics_.constraints(), links_before);
 }
 
 // What a torque does that goes on turning what it acts on, at a state in equilibrium; "" where none turns it
@@ -276,11 +300,13 @@ void LoadStepping::diverge() const {
                 human_length(reach_), human_number(reach_ / diagonal, 2))
           : "Use a smaller load or move, a smaller spacing or a stiffer material; a part that buckles or "
             "snaps through has no equilibrium nearby";
+  std::string chains = said_of_chains(mechanics_.cells().drawn_chains(state_), body);
+  if (chains.empty()) chains = said_of_chains(mechanics_.cells().drawn_chains(trial_), body);
   throw DivergedError(fmt::format(
       "no equilibrium beyond {:.4g} % of the load{} (tried {:.4g} %): {}; most compressed "
-      "is {} near {} of part \"{}\" with J = {:.3g}. {}{}",
+      "is {} near {} of part \"{}\" with J = {:.3g}{}. {}{}",
       100 * done_, limit, 100 * trial_.share, outcome_.trouble, worst.name, point_name(worst.rest),
-      body.parts[worst.part].name, worst.value, advice, said_of_dead_torques(mechanics_, state_)));
+      body.parts[worst.part].name, worst.value, chains, advice, said_of_dead_torques(mechanics_, state_)));
 }
 
 // Linear over the body, in directions that no symmetry of a part is likely to have.
@@ -330,10 +356,34 @@ bool LoadStepping::begin_near() {
     begun_ = kStarted;
   }
   const int before = result_.newton_iterations;
-  if (near_ && !attempt(NewtonSteps::full, kFullStepIterations))
-    spent_near_ = result_.newton_iterations - before;
+  if (near_ && !attempt(NewtonSteps::full, kFullStepIterations)) spent_ = result_.newton_iterations - before;
   near_.reset();
   return true;
+}
+
+void LoadStepping::begin_again(FreeStrainMode mode) {
+  free_strain_ = mode;
+  mechanics_.grow_free_strain(mode == FreeStrainMode::growing);
+  state_.displacement = beginning_.displacement;
+  restore_followers(mechanics_, beginning_.followers);
+  restore_links(mechanics_.constraints(), beginning_.links);
+  done_ = 0;
+  length_ = LoadStepLength(first_);
+  least_residual_ = 1;
+  lowers_ = false;
+  result_.load_steps = 0;
+  if (!settings_.newton_iterations) spent_ = result_.newton_iterations;
+}
+
+bool LoadStepping::change_free_strain() {
+  const bool may = !settings_.newton_iterations || iterations_left() > 0;
+  if (!may || !mechanics_.has_free_strain()) return false;
+  const bool whole_fails = free_strain_ == FreeStrainMode::whole && done_ == 0;
+  const bool growing_fails = free_strain_ == FreeStrainMode::growing &&
+                             (length_.get() <= kLoweringIncrement * first_ || iterations_left() <= 0);
+  if (whole_fails) begin_again(FreeStrainMode::growing);
+  if (growing_fails) begin_again(FreeStrainMode::whole_again);
+  return whole_fails || growing_fails;
 }
 
 EquilibriumResult LoadStepping::operator()() {
@@ -359,7 +409,7 @@ void LoadStepping::solve() {
     if (!lowers_ && attempt(NewtonSteps::full, kFullStepIterations)) continue;
     if (reach_ > hopeless_reach_) refuse_load();
     hopeless_reach_ = std::numeric_limits<double>::infinity();  // the first answer alone counts
-    if (begin_near()) continue;
+    if (begin_near() || change_free_strain()) continue;
     if (iterations_left() > 0 && !gone_through_ &&
         (indented_ || length_.get() <= kLoweringIncrement * first_) && !mechanics_.follows() &&
         attempt(NewtonSteps::lowering, NewtonOptions().max_iterations)) {
