@@ -169,7 +169,7 @@ class LoadStepping {
   double hopeless_reach_ = std::numeric_limits<double>::infinity();  // m, likewise, for the whole load
   double reach_ = 0;               // m: of the first linear answer, for the whole load
   std::optional<NearStart> near_;  // where the next attempt starts in place of `state_`
-  int spent_ = 0;                  // iterations from there, or in earlier modes of free strain, that came to nothing
+  int spent_ = 0;  // iterations from there, or in earlier modes of free strain, that came to nothing
   FreeStrainMode free_strain_ = FreeStrainMode::whole;
   bool pushed_ = false;  // the next attempt starts beside the last equilibrium
   int pushes_ = 0;
