@@ -56,6 +56,7 @@ constexpr double kPushedIncrement = 0.25;       // of the first load step: how f
 constexpr int kPushedIterations = 300;
 constexpr int kMostPushes = 4;         // of a run
 constexpr double kUnsupported = 1e-9;  // of the stiffness of an element in its stiffest direction
+constexpr double kSmallShare = 1e-3;   // of load and free strain: all goes in proportion
 constexpr double kStarted = 0.4;   // share of the run's time until a start from a coarser lattice is found
 constexpr double kFarReach = 0.1;  // diagonals: a first linear answer beyond this makes a start elsewhere pay
 constexpr double kOverload = 3;    // diagonals: a first linear answer beyond this suggests a wrong unit
@@ -146,6 +147,11 @@ class LoadStepping {
   // After an attempt: begins again with free strain in the next mode, where its time has come.
   bool change_free_strain();
   void begin_again(FreeStrainMode mode);
+  // Followers and links as at the beginning, and free strain that grows or acts whole.
+  void begin_as(bool growing);
+  // m: the largest displacement in proportion to loads and free strain, without the stresses that hindered free strain
+  // makes: they stiffen or soften the first answer, which says nothing of buckling then. 0: nothing to say.
+  double reach_beside_free_strain();
   [[nodiscard]] int iterations_left() const;
   // Beyond this only a mistake puts the first linear answer [m]; infinite where the scene says how to go on.
   [[nodiscard]] double out_of_proportion() const;
@@ -361,12 +367,16 @@ bool LoadStepping::begin_near() {
   return true;
 }
 
-void LoadStepping::begin_again(FreeStrainMode mode) {
-  free_strain_ = mode;
-  mechanics_.grow_free_strain(mode == FreeStrainMode::growing);
-  state_.displacement = beginning_.displacement;
+void LoadStepping::begin_as(bool growing) {
+  mechanics_.grow_free_strain(growing);
   restore_followers(mechanics_, beginning_.followers);
   restore_links(mechanics_.constraints(), beginning_.links);
+}
+
+void LoadStepping::begin_again(FreeStrainMode mode) {
+  free_strain_ = mode;
+  begin_as(mode == FreeStrainMode::growing);
+  state_.displacement = beginning_.displacement;
   done_ = 0;
   length_ = LoadStepLength(first_);
   least_residual_ = 1;
@@ -393,8 +403,38 @@ EquilibriumResult LoadStepping::operator()() {
     throw TimeoutError(fmt::format("{} in equilibrium with {:.4g} % of the load, {} Newton iterations",
                                    error.what(), 100 * done_, result_.newton_iterations));
   }
-  result_.linear_reach = reach_;
+  result_.linear_reach = mechanics_.has_free_strain() ? reach_beside_free_strain() : reach_;
   return result_;
+}
+
+double LoadStepping::reach_beside_free_strain() {
+  const std::vector<ActiveEffect>& effects = mechanics_.effects();
+  const auto drives = [](const ActiveEffect& effect) { return effect->drives(); };
+  const auto moved = [](const Vec3& u) { return !u.isZero(0); };
+  if (std::none_of(effects.begin(), effects.end(), drives) || indented_ || result_.buckled ||
+      std::any_of(beginning_.displacement.begin(), beginning_.displacement.end(), moved))
+    return 0;
+  const auto quiet = [](double, const std::string&) { check_stop(); };
+  State small{beginning_.displacement, 1};
+  NewtonOptions options;
+  options.steps = NewtonSteps::full;
+  const std::vector<RigidLink> links = links_now(mechanics_.constraints());
+  if (links.empty() && !mechanics_.follows()) {
+    options.max_iterations = 1;
+    options.unstressed = true;
+    return newton(mechanics_, small, options, quiet).first_reach;
+  }
+  const FollowerMemory followers = follower_memory(mechanics_);
+  small.share = kSmallShare;
+  begin_as(true);
+  const bool found = newton_with_links(mechanics_, small, options, quiet).converged;
+  begin_as(false);
+  restore_followers(mechanics_, followers);
+  restore_links(mechanics_.constraints(), links);
+  if (!found) progress_.warn("whether the part is near buckling was not found out");
+  double reach = 0;
+  for (const Vec3& u : small.displacement) reach = std::max(reach, u.norm() / kSmallShare);
+  return found ? reach : 0;
 }
 
 void LoadStepping::solve() {
@@ -483,23 +523,6 @@ void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const
                   "wall: use a smaller spacing, or voxelize with --placement corner",
                   body.parts[element_parts(body)[first]].name, human_count(count),
                   point_name(body.rest[first])));
-}
-
-double linear_reach_beside_free_strain(Mechanics& mechanics) {
-  const std::vector<ActiveEffect>& effects = mechanics.effects();
-  const std::vector<Motion>& motions = mechanics.constraints().motions;
-  if (mechanics.follows() ||
-      std::none_of(effects.begin(), effects.end(),
-                   [](const ActiveEffect& effect) { return effect->drives(); }) ||
-      std::any_of(motions.begin(), motions.end(),
-                  [](const Motion& motion) { return motion.link != nullptr; }))
-    return 0;
-  NewtonOptions options;
-  options.steps = NewtonSteps::full;
-  options.max_iterations = 1;
-  options.unstressed = true;
-  State rest{std::vector<Vec3>(mechanics.body().element_count(), Vec3::Zero()), 1};
-  return newton(mechanics, rest, options, [](double, const std::string&) { check_stop(); }).first_reach;
 }
 
 EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state, const RunSettings& settings,

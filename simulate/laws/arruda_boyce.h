@@ -2,7 +2,7 @@
 // with D = 2/K. With q = I1' / (3 lambda_m^2), the square of the share of its length that a chain is drawn to,
 //     dW/dI1' = mu/6 g(q),   g = L^-1(sqrt q) / sqrt q = 2/(1 - q) + 1 - q/5 - 2 q^2/5,
 // Kroeger's approximant of the inverse of Langevin's function (2015), within 0.3 % of it for every q < 1. (The series of
-// five terms in other programs has no end: at q = 0.41 it is 1 % below, at 0.66 a tenth.) With d = q - q0, q0 = 1 / lambda_m^2,
+// five terms in other programs has no end: at q = 0.41 it is 1 % below, at 0.66 12 %.) With d = q - q0, q0 = 1 / lambda_m^2,
 //     W = mu lambda_m^2 / 2 [-2 ln((1 - q)/(1 - q0)) + d - (2 q0 d + d^2)/10 - 2/15 (3 q0^2 d + 3 q0 d^2 + d^3)] + K/2 (J - 1)^2
 // At small strain the shear modulus is mu g(q0) / 3, the bulk modulus K. Kirchhoff's stress is
 //     tau = mu/3 g a dev e + K (J - 1) J I,   e = b - I,  a = J^-2/3,
