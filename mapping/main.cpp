@@ -166,6 +166,10 @@ void plan_refinement(const Arguments& arguments, const CommandLine& app, Plan& p
   if (!arguments.points.empty() || !mesh) plan.refine.mode = RefineOptions::Mode::off;
 }
 
+std::vector<std::string> inputs_of(const Arguments& arguments) {
+  return {arguments.body, arguments.onto, arguments.points, arguments.binding};
+}
+
 Plan make_plan(Arguments& arguments, const CommandLine& app) {
   Plan plan;
   plan.options = map_options(arguments.map);
@@ -211,12 +215,10 @@ Plan make_plan(Arguments& arguments, const CommandLine& app) {
         "--far and --binding are for vertices, which STEP, IGES and BREP do not have: leave them out");
   check_in_pieces(arguments, plan);
   plan_refinement(arguments, app, plan);
-  const std::vector<std::string> inputs = {arguments.body, arguments.onto, arguments.points,
-                                           arguments.binding};
-  std::vector<OutputName> outputs = {{arguments.save_binding, true}};
+  std::vector<OutputName> outputs = {{arguments.save_binding, true}, {plan.crack.pieces}};
   if (!plan.series) outputs.insert(outputs.end(), {{arguments.map.report}, {arguments.output}});
   if (arguments.json) outputs.push_back({"-"});
-  check_outputs(outputs, inputs, arguments.force);
+  check_outputs(outputs, inputs_of(arguments), arguments.force);
   return plan;
 }
 
@@ -422,10 +424,12 @@ void split_for_series(const std::vector<std::string>& files, Body& first, const 
 void map_series(const Arguments& arguments, Plan& plan, Progress& progress) {
   Run run(arguments, plan, progress);
   const std::vector<std::string> files = series_files(arguments.body);
+  std::vector<std::string> inputs = inputs_of(arguments);
+  inputs.insert(inputs.end(), files.begin(), files.end());
   for (std::size_t f = 0; f < files.size(); ++f) {
     std::vector<OutputName> outputs = {{frame_name(arguments.output, f)}};
     if (!arguments.map.report.empty()) outputs.push_back({frame_name(arguments.map.report, f)});
-    check_outputs(outputs, {files.begin(), files.end()}, arguments.force);
+    check_outputs(outputs, inputs, arguments.force);
   }
   Body body;
   std::optional<Binding> binding;

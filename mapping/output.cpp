@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/files/files.h"
+#include "base/files/outputs.h"
 #include "formats/common/file_formats.h"
 #include "formats/lattice/column_names.h"
 #include "mapping/report/attributes.h"
@@ -78,13 +79,15 @@ void write_mapped(const Surface& surface, const Body& body, const MapResult& res
 void keep_source(const Body& body, const std::string& path) {
   namespace fs = std::filesystem;
   std::error_code ignored;
-  const std::string name = fs::path(path).filename().string();
-  for (const SurfaceSource& source : body.surface.sources)
-    if (source.file == name && fs::is_regular_file(path, ignored) &&
-        content_hash(read_all(path)) == source.hash)
-      throw InputError(path,
-                       "is the part that the body was made of: name another output, or add --force to "
-                       "replace it");
+  for (const std::string& file : files_replaced(path)) {
+    const std::string name = fs::path(file).filename().string();
+    for (const SurfaceSource& source : body.surface.sources)
+      if (source.file == name && fs::is_regular_file(file, ignored) &&
+          content_hash(read_all(file)) == source.hash)
+        throw InputError(file,
+                         "is the part that the body was made of: name another output, or add --force to "
+                         "replace it");
+  }
 }
 
 }  // namespace flexel::mapping

@@ -275,12 +275,8 @@ SimulateResult Run::operator()() {
   const bool from_rest = std::all_of(state_.displacement.begin(), state_.displacement.end(),
                                      [](const Vec3& u) { return u.isZero(0); });
   const EquilibriumResult solved = solve(mechanics);
-  // Hindered free strain stiffens or softens the first answer, and so does what touches: it says nothing of
-  // buckling then.
-  if (from_rest && !solved.buckled && !mechanics.unilateral())
-    linear_reach_ = body_.cell_columns.contains(kFreeStrainColumn)
-                        ? linear_reach_beside_free_strain(mechanics)
-                        : solved.linear_reach;
+  // What touches stiffens or softens the first answer, which says nothing of buckling then.
+  if (from_rest && !solved.buckled && !mechanics.unilateral()) linear_reach_ = solved.linear_reach;
   const StopWaits answered;  // what is found is told: the rest takes moments
   buckled_ = solved.buckled;
   followers_ = follower_memory(mechanics);

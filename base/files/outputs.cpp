@@ -1,9 +1,12 @@
 // Two names mean the same file when device and inode agree or, where one does not exist yet, when folder and
-// name agree.
+// name agree. A name may stand for many files: the frames of a series, or a file a part. What such a name may
+// replace is what lies there already, and an input does.
 #include "base/files/outputs.h"
 
 #include <fmt/format.h>
+#include <glob.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "base/error.h"
@@ -17,6 +20,29 @@ namespace fs = std::filesystem;
 
 bool is_pattern(const std::string& path) {
   return path.find("{part}") != std::string::npos || path.find("{frame}") != std::string::npos;
+}
+
+bool is_series(const std::string& path) {
+  return extension(path) == "pvd" && !is_pattern(path);
+}
+
+// What glob() takes for itself alone.
+std::string literal(const std::string& text) {
+  std::string result;
+  for (const char c : text) {
+    if (c == '*' || c == '?' || c == '[' || c == '\\') result += '\\';
+    result += c;
+  }
+  return result;
+}
+
+std::vector<std::string> files_like(const std::string& pattern) {
+  glob_t found{};
+  std::vector<std::string> files;
+  if (::glob(pattern.c_str(), GLOB_PERIOD, nullptr, &found) == 0)
+    files.assign(found.gl_pathv, found.gl_pathv + found.gl_pathc);
+  ::globfree(&found);
+  return files;
 }
 
 bool can_be_shared(const std::string& path) {
@@ -36,12 +62,52 @@ bool same_file(const std::string& a, const std::string& b) {
 
 }  // namespace
 
+std::vector<std::string> files_replaced(const std::string& path) {
+  if (is_pattern(path)) {
+    std::string pattern = literal(path);
+    for (const std::string place : {"{part}", "{frame}"})
+      for (std::size_t at = pattern.find(place); at != std::string::npos; at = pattern.find(place))
+        pattern.replace(at, place.size(), "*");
+    return files_like(pattern);
+  }
+  std::vector<std::string> files;
+  if (std::error_code none; fs::exists(path, none)) files.push_back(path);
+  if (!is_series(path)) return files;
+  const std::string before = path.substr(0, path.size() - 4) + "_", after = ".vtu";
+  for (const std::string& frame : files_like(literal(before) + "*" + after)) {
+    const std::string number = frame.substr(before.size(), frame.size() - before.size() - after.size());
+    if (!number.empty() && number.find_first_not_of("0123456789") == std::string::npos)
+      files.push_back(frame);
+  }
+  return files;
+}
+
+namespace {
+
+// Throws InputError where `path` would or may replace one of `inputs`.
+void keep_inputs(const std::string& path, const std::vector<std::string>& inputs) {
+  const auto is_input = [&](const std::string& file) {
+    return std::any_of(inputs.begin(), inputs.end(), [&](const std::string& input) {
+      return !input.empty() && input != "-" && same_file(file, input);
+    });
+  };
+  const std::string what = "is an input of this command",
+                    advice = "name another output, or add --force to replace it";
+  if (is_input(path)) throw InputError(path, fmt::format("{}: {}", what, advice));
+  for (const std::string& file : files_replaced(path))
+    if (is_input(file))
+      throw InputError(file, fmt::format("{} and fits the name of a result, {}: {}", what,
+                                         is_series(path) ? "a frame of " + path : path, advice));
+}
+
+}  // namespace
+
 void check_outputs(const std::vector<OutputName>& outputs, const std::vector<std::string>& inputs,
                    bool force) {
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     const std::string& path = outputs[i].path;
-    if (path.empty() || is_pattern(path)) continue;
-    for (std::size_t j = 0; j < i; ++j) {
+    if (path.empty()) continue;
+    for (std::size_t j = 0; j < i && !is_pattern(path); ++j) {
       const std::string& other = outputs[j].path;
       if (other.empty() || is_pattern(other)) continue;
       if (means_stdout(path) && means_stdout(other))
@@ -49,11 +115,7 @@ void check_outputs(const std::vector<OutputName>& outputs, const std::vector<std
       if (!means_stdout(path) && !means_stdout(other) && !can_be_shared(path) && same_file(path, other))
         throw InputError(fmt::format("two results would go to \"{}\": give each a name of its own", path));
     }
-    if (means_stdout(path) || can_be_shared(path) || force) continue;
-    for (const std::string& input : inputs)
-      if (!input.empty() && input != "-" && same_file(path, input))
-        throw InputError(path,
-                         "is an input of this command: name another output, or add --force to replace it");
+    if (!means_stdout(path) && !can_be_shared(path) && !force) keep_inputs(path, inputs);
   }
   for (const OutputName& output : outputs)
     if (!is_pattern(output.path)) refuse_unwritable(output.path, output.binary);

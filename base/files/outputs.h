@@ -9,12 +9,17 @@
 namespace flexel {
 
 struct OutputName {
-  std::string path;     // "": none; with "{part}" or "{frame}" a pattern, which is not compared
+  // "": none; with "{part}" or "{frame}" a pattern, which is not compared with other outputs; NAME.pvd: its frames too
+  std::string path;
   bool binary = false;  // refused where stdout is a terminal
 };
 
+// Files that are there and that a result to `path` would replace or, of many files, may: frames NAME_00012.vtu of NAME.pvd,
+// any text in place of "{part}" and "{frame}".
+[[nodiscard]] std::vector<std::string> files_replaced(const std::string& path);
+
 // Throws InputError: an output that cannot be written, two that are one file (by links too) or both stdout,
-// and, without `force`, one that is an input. Devices may be given twice.
+// and, without `force`, one that is an input or may replace one (files_replaced). Devices may be given twice.
 void check_outputs(const std::vector<OutputName>& outputs, const std::vector<std::string>& inputs,
                    bool force);
 

@@ -142,19 +142,21 @@ def beam(data):
 
 
 def drawn(data):
-    """Nominal stress [MPa] of rubber under pulls along one and two axes, by two laws."""
+    """Nominal stress [MPa] of rubber under pulls along one and two axes, by three laws."""
     of = data["rubber"]
     unit = of["unit"] / 1e6
     stress_at = {stretch: stress * unit for stretch, stress in of["uniaxial"]}
     reduced = [stress_at[a] / (a - a**-2) for a in (of["first"], of["second"])]
     slope = (reduced[0] - reduced[1]) / (1 / of["first"] - 1 / of["second"])  # Mooney's plot: 2 C10 + 2 C01 / a
     constants = {"neo-Hooke": (reduced[0] / 2, 0.0), "Mooney-Rivlin": ((reduced[0] - slope / of["first"]) / 2, slope / 2)}
+    matter = {law: {"law": "mooney-rivlin", "c10": f"{c10!r} MPa", "c01": f"{c01!r} MPa", "bulk": f"{of['bulk'] * 2 * (c10 + c01)!r} MPa"}
+              for law, (c10, c01) in constants.items()}
+    matter["Arruda-Boyce"] = {"law": "arruda-boyce", "mu": f"{of['chains']!r} MPa", "lambda_m": math.sqrt(of["links"]), "bulk": f"{of['bulk'] * of['chains']!r} MPa"}
     lengths = (10.0, 10.0, 10.0)
     cases = [Case(ascii_stl(box_triangles(lengths)), size, suffix="stl") for size in (5, 2.5)]
     rows, curves = [], {}
-    for law, (c10, c01) in constants.items():
-        head = 'material = "it"\n' + material("it", law="mooney-rivlin", c10=f"{c10!r} MPa", c01=f"{c01!r} MPa", bulk=f"{of['bulk'] * 2 * (c10 + c01)!r} MPa",
-                                              density="950 kg/m3")
+    for law, keys in matter.items():
+        head = 'material = "it"\n' + material("it", density="950 kg/m3", **keys)
         for test, axes in (("one way", "x"), ("two ways", "xy")):
             points = []
             for stretch, stress in of["uniaxial" if axes == "x" else "biaxial"]:
@@ -172,7 +174,7 @@ def drawn(data):
             curves[f"{test}, {law}"] = points
     told = "; ".join(f"{law} C10 = {c10:.4f}, C01 = {c01:.4f} MPa" for law, (c10, c01) in constants.items())
     return {"rows": rows, "unit": "MPa", "across": "stretch", "curves": curves,
-            "how": f"Equilibrium, model `cells`, law `mooney-rivlin` ({told}), a cube of 8 cells and of 64."}
+            "how": f"Equilibrium, model `cells`, laws `mooney-rivlin` ({told}) and `arruda-boyce`, a cube of 8 cells and of 64."}
 
 
 def quarter_rod(radius, length, sides=24):

@@ -28,6 +28,12 @@ c01 = "0.05 MPa"
 bulk = "1.6 MPa"
 density = "1000 kg/m3"
 """
+CHAINS = """law = "arruda-boyce"
+mu = "0.4 MPa"
+lambda_m = 3
+bulk = "1.6 MPa"
+density = "1000 kg/m3"
+"""
 GUM = """young = "1.2 MPa"
 poisson = 0.3
 density = "1000 kg/m3"
@@ -36,6 +42,8 @@ ASKEW = f"[parts.bar]\naxes = [[{math.sqrt(0.75):.12f}, 0.5, 0], [-0.5, {math.sq
 CASES = [("neo-Hooke", "bent, small", GUM, "", (0, 0, 1e-3)),
          ("Mooney-Rivlin", "bent, small", ELASTOMER, "", (0, 0, 1e-3)),
          ("Mooney-Rivlin", "drawn and bent, large", ELASTOMER, "", (100, 0, 2)),
+         ("Arruda-Boyce", "bent, small", CHAINS, "", (0, 0, 1e-3)),
+         ("Arruda-Boyce", "drawn and bent, large", CHAINS, "", (100, 0, 2)),
          ("orthotropic, along the bar", "bent, small", GRAIN, "", (0, 0, 1e-3)),
          ("orthotropic, 30 degrees askew", "bent, small", GRAIN, ASKEW, (0, 1e-3, 0)),
          ("orthotropic, 30 degrees askew", "drawn, large", GRAIN, ASKEW, (20, 0, 0))]

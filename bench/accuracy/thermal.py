@@ -5,7 +5,8 @@
 
 References: alpha dT and E alpha dT (/ (1 - 2 nu)); Timoshenko, Analysis of bi-metal thermostats (J. Opt. Soc. Am. 11, 1925); thick tube under a radial temperature
 difference, plane strain (Timoshenko and Goodier, Theory of Elasticity, 1970, section 151); a straight fin with a convective tip (Incropera and DeWitt);
-a printed bar by beam theory, kappa = 12 / h^3 sum of the layers' strain times their arm.
+NAFEMS LE11, solid cylinder, taper and sphere under T = r + z (The Standard NAFEMS Benchmarks, 1990; dimensions as tests/nafems-le11.geo of
+github.com/seamplex/feenox has them), stress along z at the inner corner of the lowest face; a printed bar by beam theory, kappa = 12 / h^3 sum of the layers' strain times their arm.
 """
 
 import argparse
@@ -13,6 +14,7 @@ import json
 import math
 import pathlib
 import re
+import struct
 import subprocess
 import sys
 import tempfile
@@ -160,6 +162,65 @@ def tube(folder, inner=10.0, outer=20.0, size=1.25):
             ("tube, heat [W]", heat(said, "inner"), flow)]
 
 
+def profile():
+    """Radius and height [m] of LE11's section, inner side up, then outer side down."""
+    slope, arc = math.sqrt(0.5), 24
+    inner = [(math.cos(k * math.pi / 4 / arc), math.sin(k * math.pi / 4 / arc)) for k in range(arc + 1)]
+    top = slope + 0.345 + 0.345
+    least = math.asin(slope / 1.4)
+    outer = [(1.4 * math.cos(k * least / arc), 1.4 * math.sin(k * least / arc)) for k in range(arc + 1)]
+    steps = lambda a, b, n: [(a[0] + (b[0] - a[0]) * k / n, a[1] + (b[1] - a[1]) * k / n) for k in range(1, n + 1)]
+    end = (slope, top + 0.4)
+    inner += steps(inner[-1], (slope, top), arc // 2) + steps((slope, top), end, arc // 2)
+    outer += steps(outer[-1], (1.0, top), arc // 2) + steps((1.0, top), (1.0, end[1]), arc // 2)
+    return inner, outer
+
+
+def quarter_turned(inner, outer, steps=48):
+    """OBJ [mm] of the section turned by a quarter about z, with groups start, end, bottom, top, inner and outer."""
+    sides = [inner, outer]
+    lines, count = [], len(inner)
+    for i in range(steps + 1):
+        turn = i * math.pi / 2 / steps
+        for side in sides:
+            lines += [f"v {1e3 * r * math.cos(turn):.12g} {1e3 * r * math.sin(turn):.12g} {1e3 * z:.12g}" for r, z in side]
+    at = lambda side, k, i: 1 + k + count * (side + 2 * i)
+    quads = {"start": [[at(0, k, 0), at(1, k, 0), at(1, k + 1, 0), at(0, k + 1, 0)] for k in range(count - 1)],
+             "end": [[at(0, k, steps), at(0, k + 1, steps), at(1, k + 1, steps), at(1, k, steps)] for k in range(count - 1)]}
+    quads["bottom"] = [[at(0, 0, i), at(0, 0, i + 1), at(1, 0, i + 1), at(1, 0, i)] for i in range(steps)]
+    quads["top"] = [[at(0, count - 1, i), at(1, count - 1, i), at(1, count - 1, i + 1), at(0, count - 1, i + 1)] for i in range(steps)]
+    quads["inner"] = [[at(0, k, i), at(0, k + 1, i), at(0, k + 1, i + 1), at(0, k, i + 1)] for i in range(steps) for k in range(count - 1)]
+    quads["outer"] = [[at(1, k, i), at(1, k, i + 1), at(1, k + 1, i + 1), at(1, k + 1, i)] for i in range(steps) for k in range(count - 1)]
+    for name, faces in quads.items():
+        lines += [f"g {name}"] + ["f " + " ".join(map(str, face)) for face in faces]
+    return "\n".join(lines) + "\n"
+
+
+def add_column(path, name, values):
+    """Adds a column of the elements to a body file: to its header, and to the end of what is appended."""
+    data = path.read_bytes()
+    start, end = data.index(b"_", data.index(b"<AppendedData")) + 1, data.rindex(b"</AppendedData>")
+    end -= len(data[start:end]) - len(data[start:end].rstrip(b"\n"))
+    array = f'<DataArray type="Float64" Name="{name}" format="appended" offset="{end - start}"/>\n'.encode()
+    at = data.index(b"</PointData>")
+    path.write_bytes(data[:at] + array + data[at:end] + struct.pack(f"<Q{len(values)}d", 8 * len(values), *values) + data[end:])
+
+
+def le11(folder, size=60):
+    """Stress along z [MPa] at (1, 0, 0) m, the least principal stress there: that along the radius is 0, the hoop stress a pull."""
+    import meshio
+    (folder / "part.obj").write_text(quarter_turned(*profile()))
+    call("flexel-voxelize", folder / "part.obj", "--size", f"{size}mm", "--moments", "-o", folder / "rest.vtu", "--force")
+    places = meshio.read(folder / "rest.vtu").points
+    add_column(folder / "rest.vtu", "temperature", [math.hypot(x, y) + z for x, y, z in places])
+    matter = MATERIAL.replace(f"{YOUNG / 1e9} GPa", "210 GPa").replace("12e-6", "2.3e-4")
+    (folder / "scene.toml").write_text('material = "m"\nmodel = "quadratic"\n' + matter + '[thermal]\ncolumn = "temperature"\nreference = "0 K"\n' + fix("start", "y") +
+                                       fix("end", "x") + fix("bottom", "z") + fix("top", "z"))
+    call("flexel-simulate", folder / "scene.toml", folder / "rest.vtu", "-o", folder / "bent.vtu", "--no-estimate", "--force")
+    call("flexel-map", folder / "bent.vtu", "-o", folder / "mapped.vtu", "--refine", "off", "--force")
+    return meshio.read(folder / "mapped.vtu").point_data["principal_stress"][0].min() / 1e6, -105.0
+
+
 def rod(folder):
     """Heat [W] of a rod between two temperatures."""
     scene = QUADRATIC + '[[temperature]]\nwhere = "xmin"\nvalue = "80 degC"\n[[temperature]]\nwhere = "xmax"\nvalue = "30 degC"\n' + fix("xmin")
@@ -203,7 +264,7 @@ def printed_bar(folder, model="quadratic"):
 
 CASES = [("bar between walls, stress [Pa]", between_walls), ("held all around, force on a wall [N]", held_all_around),
          ("bimetal strip, model cells, curvature [1/m]", bimetal), ("rod, heat [W]", rod), ("wall with convection, heat [W]", wall),
-         ("fin, heat [W]", fin), ("printed bar, curvature [1/m]", printed_bar),
+         ("fin, heat [W]", fin), ("NAFEMS LE11, stress along z at A [MPa]", le11), ("printed bar, curvature [1/m]", printed_bar),
          ("printed bar, model cells, curvature [1/m]", lambda folder: printed_bar(folder, "cells"))]
 
 

@@ -187,6 +187,10 @@ class Writer {
         line("*HYPERELASTIC, MOONEY-RIVLIN\n{:.10g},{:.10g},{:.10g}", unit * m.c10, unit * m.c01,
              2 / (unit * m.bulk));
         return;
+      case simulate::LawName::arruda_boyce:  // D = 2 / K
+        line("*HYPERELASTIC, ARRUDA-BOYCE\n{:.10g},{:.10g},{:.10g}", unit * m.chain_mu, m.lambda_m,
+             2 / (unit * m.bulk));
+        return;
       case simulate::LawName::orthotropic:
         line(
             "*ELASTIC, TYPE=ENGINEERING CONSTANTS\n{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},"

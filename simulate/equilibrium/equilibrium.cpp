@@ -9,6 +9,10 @@
 // though the forces are all but balanced, the part buckles, and symmetry keeps Newton's method on the branch
 // that is not stable any more. There a small, smooth push to a side starts steps that lower the energy; what
 // they end in is an equilibrium like any other, without the push.
+//
+// Free strain acts whole in every load step. Where the first attempt fails, the run begins again with free strain
+// that grows with the load, by full steps down to a thirty-second. Where that comes to a bifurcation, it begins for
+// the last time, whole: so a part that heat would buckle keeps to its branch, and the caller warns of it.
 #include "simulate/equilibrium/equilibrium.h"
 
 #include <fmt/format.h>
@@ -51,6 +55,7 @@ constexpr double kPushedIncrement = 0.25;  // of the first load step: how far be
 constexpr int kPushedIterations = 300;
 constexpr int kMostPushes = 4;         // of a run
 constexpr double kUnsupported = 1e-9;  // of the stiffness of an element in its stiffest direction
+constexpr double kSmallShare = 1e-3;   // of load and free strain: all goes in proportion
 constexpr double kStarted = 0.4;   // share of the run's time until a start from a coarser lattice is found
 constexpr double kFarReach = 0.1;  // diagonals: a first linear answer beyond this makes a start elsewhere pay
 constexpr double kOverload = 3;    // diagonals: a first linear answer beyond this suggests a wrong unit
@@ -85,6 +90,22 @@ void restore_followers(Mechanics& mechanics, const FollowerMemory& memory) {
     if (effect->follows() && next < memory.size()) effect->restore(memory[next++]);
 }
 
+// What a run begins from, once more where free strain is to act otherwise.
+struct RunBeginning {
+  std::vector<Vec3> displacement;  // m (elements)
+  FollowerMemory followers;
+  std::vector<RigidLink> links;
+};
+
+// How free strain acts in the load steps.
+enum class FreeStrainMode { whole, growing, whole_again };
+
+void restore_links(const Constraints& constraints, const std::vector<RigidLink>& links) {
+  auto link = links.begin();
+  for (const Motion& motion : constraints.motions)
+    if (motion.link) *motion.link = *link++;
+}
+
 // A run over load steps.
 class LoadStepping {
  public:
@@ -95,6 +116,7 @@ class LoadStepping {
         settings_(settings),
         progress_(progress),
         start_(start),
+        beginning_{state.displacement, follower_memory(mechanics), links_now(mechanics.constraints())},
         first_(1.0 / std::max(settings.load_steps, least_load_steps(mechanics))),
         length_(first_),
         unilateral_(mechanics.unilateral()) {}
@@ -120,6 +142,14 @@ class LoadStepping {
     return reach_ > (mechanics_.follows() ? kOutOfProportion : kOverload) *
                         bounding_box(mechanics_.body().rest).diagonal();
   }
+  // After an attempt: begins again with free strain in the next mode, where its time has come.
+  bool change_free_strain();
+  void begin_again(FreeStrainMode mode);
+  // Followers and links as at the beginning, and free strain that grows or acts whole.
+  void begin_as(bool growing);
+  // m: the largest displacement in proportion to loads and free strain, without the stresses that hindered free strain
+  // makes: they stiffen or soften the first answer, which says nothing of buckling then. 0: nothing to say.
+  double reach_beside_free_strain();
   [[nodiscard]] int iterations_left() const;
   // Beyond this only a mistake puts the first linear answer [m]; infinite where the scene says how to go on.
   [[nodiscard]] double out_of_proportion() const;
@@ -131,6 +161,7 @@ class LoadStepping {
   const RunSettings& settings_;
   Progress& progress_;
   const CoarseStart& start_;
+  const RunBeginning beginning_;
   double first_;  // share of the load: the first step; none is longer
   LoadStepLength length_;
   double done_ = 0;                  // share of the load
@@ -142,8 +173,9 @@ class LoadStepping {
   double hopeless_reach_ = std::numeric_limits<double>::infinity();  // m, likewise, for the whole load
   double reach_ = 0;               // m: of the first linear answer, for the whole load
   std::optional<NearStart> near_;  // where the next attempt starts in place of `state_`
-  int spent_near_ = 0;             // iterations of an attempt from there that came to nothing
-  bool pushed_ = false;            // the next attempt starts beside the last equilibrium
+  int spent_ = 0;  // iterations from there, or in earlier modes of free strain, that came to nothing
+  FreeStrainMode free_strain_ = FreeStrainMode::whole;
+  bool pushed_ = false;  // the next attempt starts beside the last equilibrium
   int pushes_ = 0;
   double least_residual_ = 1;  // relative, of the attempts since the last equilibrium
   bool unilateral_;       // a whole step is no good where what touches changes, and the energy tells the way
@@ -155,7 +187,7 @@ int LoadStepping::iterations_left() const {
   const int usual = unilateral_ ? kUnilateralIterations : kIterations;
   const int allowed = settings_.newton_iterations.value_or(overloaded() ? kOverloadIterations : usual);
   const int more = unilateral_ ? kIterationsPerUnilateralStep : kIterationsPerLoadStep;
-  return allowed + more * result_.load_steps + kPushedIterations * pushes_ + spent_near_ -
+  return allowed + more * result_.load_steps + kPushedIterations * pushes_ + spent_ -
          result_.newton_iterations;
 }
 
@@ -242,9 +274,7 @@ void LoadStepping::refuse_way(const std::vector<RigidLink>& links_before) {
   outcome_.converged = false;
   outcome_.relative_residual = 1;
   outcome_.trouble = why;
-  auto link = links_before.begin();
-  for (const Motion& motion : mechanics_.constraints().motions)
-    if (motion.link) *motion.link = *link++;
+  restore_links(mechanics_.constraints(), links_before);
 }
 
 // What a torque does that goes on turning what it acts on, at a state in equilibrium; "" where none turns it
@@ -278,11 +308,13 @@ void LoadStepping::diverge() const {
                 human_length(reach_), human_number(reach_ / diagonal, 2))
           : "Use a smaller load or move, a smaller spacing or a stiffer material; a part that buckles or "
             "snaps through has no equilibrium nearby";
+  std::string chains = said_of_chains(mechanics_.cells().drawn_chains(state_), body);
+  if (chains.empty()) chains = said_of_chains(mechanics_.cells().drawn_chains(trial_), body);
   throw DivergedError(fmt::format(
       "no equilibrium beyond {:.4g} % of the load{} (tried {:.4g} %): {}; most compressed "
-      "is {} near {} of part \"{}\" with J = {:.3g}. {}{}",
+      "is {} near {} of part \"{}\" with J = {:.3g}{}. {}{}",
       100 * done_, limit, 100 * trial_.share, outcome_.trouble, worst.name, point_name(worst.rest),
-      body.parts[worst.part].name, worst.value, advice, said_of_dead_torques(mechanics_, state_)));
+      body.parts[worst.part].name, worst.value, chains, advice, said_of_dead_torques(mechanics_, state_)));
 }
 
 // Linear over the body, in directions that no symmetry of a part is likely to have.
@@ -332,10 +364,38 @@ bool LoadStepping::begin_near() {
     begun_ = kStarted;
   }
   const int before = result_.newton_iterations;
-  if (near_ && !attempt(NewtonSteps::full, kFullStepIterations))
-    spent_near_ = result_.newton_iterations - before;
+  if (near_ && !attempt(NewtonSteps::full, kFullStepIterations)) spent_ = result_.newton_iterations - before;
   near_.reset();
   return true;
+}
+
+void LoadStepping::begin_as(bool growing) {
+  mechanics_.grow_free_strain(growing);
+  restore_followers(mechanics_, beginning_.followers);
+  restore_links(mechanics_.constraints(), beginning_.links);
+}
+
+void LoadStepping::begin_again(FreeStrainMode mode) {
+  free_strain_ = mode;
+  begin_as(mode == FreeStrainMode::growing);
+  state_.displacement = beginning_.displacement;
+  done_ = 0;
+  length_ = LoadStepLength(first_);
+  least_residual_ = 1;
+  lowers_ = false;
+  result_.load_steps = 0;
+  if (!settings_.newton_iterations) spent_ = result_.newton_iterations;
+}
+
+bool LoadStepping::change_free_strain() {
+  const bool may = !settings_.newton_iterations || iterations_left() > 0;
+  if (!may || !mechanics_.has_free_strain()) return false;
+  const bool whole_fails = free_strain_ == FreeStrainMode::whole && done_ == 0;
+  const bool growing_fails = free_strain_ == FreeStrainMode::growing &&
+                             (length_.get() <= kLoweringIncrement * first_ || iterations_left() <= 0);
+  if (whole_fails) begin_again(FreeStrainMode::growing);
+  if (growing_fails) begin_again(FreeStrainMode::whole_again);
+  return whole_fails || growing_fails;
 }
 
 EquilibriumResult LoadStepping::operator()() {
@@ -345,8 +405,38 @@ EquilibriumResult LoadStepping::operator()() {
     throw TimeoutError(fmt::format("{} in equilibrium with {:.4g} % of the load, {} Newton iterations",
                                    error.what(), 100 * done_, result_.newton_iterations));
   }
-  result_.linear_reach = reach_;
+  result_.linear_reach = mechanics_.has_free_strain() ? reach_beside_free_strain() : reach_;
   return result_;
+}
+
+double LoadStepping::reach_beside_free_strain() {
+  const std::vector<ActiveEffect>& effects = mechanics_.effects();
+  const auto drives = [](const ActiveEffect& effect) { return effect->drives(); };
+  const auto moved = [](const Vec3& u) { return !u.isZero(0); };
+  if (std::none_of(effects.begin(), effects.end(), drives) || indented_ || result_.buckled ||
+      std::any_of(beginning_.displacement.begin(), beginning_.displacement.end(), moved))
+    return 0;
+  const auto quiet = [](double, const std::string&) { check_stop(); };
+  State small{beginning_.displacement, 1};
+  NewtonOptions options;
+  options.steps = NewtonSteps::full;
+  const std::vector<RigidLink> links = links_now(mechanics_.constraints());
+  if (links.empty() && !mechanics_.follows()) {
+    options.max_iterations = 1;
+    options.unstressed = true;
+    return newton(mechanics_, small, options, quiet).first_reach;
+  }
+  const FollowerMemory followers = follower_memory(mechanics_);
+  small.share = kSmallShare;
+  begin_as(true);
+  const bool found = newton_with_links(mechanics_, small, options, quiet).converged;
+  begin_as(false);
+  restore_followers(mechanics_, followers);
+  restore_links(mechanics_.constraints(), links);
+  if (!found) progress_.warn("whether the part is near buckling was not found out");
+  double reach = 0;
+  for (const Vec3& u : small.displacement) reach = std::max(reach, u.norm() / kSmallShare);
+  return found ? reach : 0;
 }
 
 void LoadStepping::solve() {
@@ -361,7 +451,7 @@ void LoadStepping::solve() {
     if (!lowers_ && attempt(NewtonSteps::full, kFullStepIterations)) continue;
     if (reach_ > hopeless_reach_) refuse_load();
     hopeless_reach_ = std::numeric_limits<double>::infinity();  // the first answer alone counts
-    if (begin_near()) continue;
+    if (begin_near() || change_free_strain()) continue;
     if (iterations_left() > 0 && !refused_ && (unilateral_ || length_.get() <= kLoweringIncrement * first_) &&
         !mechanics_.follows() && attempt(NewtonSteps::lowering, NewtonOptions().max_iterations)) {
       lowers_ = unilateral_;
@@ -434,23 +524,6 @@ void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const
                   "wall: use a smaller spacing, or voxelize with --placement corner",
                   body.parts[element_parts(body)[first]].name, human_count(count),
                   point_name(body.rest[first])));
-}
-
-double linear_reach_beside_free_strain(Mechanics& mechanics) {
-  const std::vector<ActiveEffect>& effects = mechanics.effects();
-  const std::vector<Motion>& motions = mechanics.constraints().motions;
-  if (mechanics.follows() ||
-      std::none_of(effects.begin(), effects.end(),
-                   [](const ActiveEffect& effect) { return effect->drives(); }) ||
-      std::any_of(motions.begin(), motions.end(),
-                  [](const Motion& motion) { return motion.link != nullptr; }))
-    return 0;
-  NewtonOptions options;
-  options.steps = NewtonSteps::full;
-  options.max_iterations = 1;
-  options.unstressed = true;
-  State rest{std::vector<Vec3>(mechanics.body().element_count(), Vec3::Zero()), 1};
-  return newton(mechanics, rest, options, [](double, const std::string&) { check_stop(); }).first_reach;
 }
 
 EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state, const RunSettings& settings,

@@ -16,8 +16,10 @@ struct EquilibriumResult {
   int load_steps = 0, newton_iterations = 0, cg_iterations = 0;
   double relative_residual = 0;
   double linear_seconds = 0;
-  bool buckled = false;     // left a branch that was not stable any more
-  double linear_reach = 0;  // m: the largest displacement of the first linear answer, for the whole load
+  bool buckled = false;  // left a branch that was not stable any more
+  // m: the largest displacement in proportion to the whole load, as if free strain made no stresses; 0 where only free
+  // strain moves the body, or it was not found
+  double linear_reach = 0;
 };
 
 // What loads that follow the shape remember of the way to where they are: Effect::memory() of each, in their
@@ -38,10 +40,6 @@ void refuse_free_motions(Mechanics& mechanics, const State& start, const std::st
 // Elements of centre-placed parts whose connections lie in one plane or line, and that no tie holds across
 // it, resist nothing in that direction: throws InputError(scene, ...) naming part, number and place.
 void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const std::string& scene);
-
-// m: the largest displacement of the linear answer under the whole load, from the lattice's shape, as if free strain
-// made no stresses there. Zero where only free strain moves the body, and where loads follow or act by rigid links.
-[[nodiscard]] double linear_reach_beside_free_strain(Mechanics& mechanics);
 
 // Moves `state` to equilibrium under the whole load. Throws DivergedError naming load step, iteration, the
 // worst cell and a suggestion; Interrupted and TimeoutError (base/stop.h). `state` is then the last one in

@@ -79,6 +79,10 @@ class Mechanics {
 
   void report(const State& state, SimulateResult& result);
 
+  [[nodiscard]] bool has_free_strain() const { return free_scale_ > 0; }
+  // From here on it acts in proportion to State::share, or whole.
+  void grow_free_strain(bool grows) { cells_.grow_free_strain(grows); }
+
  private:
   static std::vector<CoupledElements> coupled(const std::vector<ActiveEffect>& effects);
   void make_tangent(const Problem& problem);

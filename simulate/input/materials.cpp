@@ -319,6 +319,8 @@ Law law_of(const Material& material, const Mat3& frame) {
       return neo_hooke_law(shear_modulus(material), lame_lambda(material));
     case LawName::mooney_rivlin:
       return mooney_rivlin_law(material.c10, material.c01, material.bulk);
+    case LawName::arruda_boyce:
+      return arruda_boyce_law(material.chain_mu, material.lambda_m, material.bulk);
     case LawName::orthotropic:
       return orthotropic_law(compliance(material), frame.transpose() * material.axes);
   }
@@ -338,6 +340,8 @@ const char* law_name(LawName law) {
       return "neo-hooke";
     case LawName::mooney_rivlin:
       return "mooney-rivlin";
+    case LawName::arruda_boyce:
+      return "arruda-boyce";
     case LawName::orthotropic:
       return "orthotropic";
   }

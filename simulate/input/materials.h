@@ -32,7 +32,8 @@ struct Material {
   // The elastic law (docs/theory/laws.md). Of others than neo-Hooke's `young` and `poisson` are those of the isotropic
   // material next to it at small strain, which penalties and bounds take.
   LawName law = LawName::neo_hooke;
-  double c10 = 0, c01 = 0, bulk = 0;  // Pa, of Mooney and Rivlin
+  double c10 = 0, c01 = 0, bulk = 0;  // Pa, of Mooney and Rivlin; `bulk` of Arruda and Boyce too
+  double chain_mu = 0, lambda_m = 0;  // of Arruda and Boyce: Pa; the stretch at which chains end
   // Orthotropic, in the axes of the material: E_1, E_2, E_3 [Pa]; nu_12, nu_13, nu_23; G_12, G_13, G_23 [Pa]
   Vec3 youngs = Vec3::Zero(), poissons = Vec3::Zero(), shears = Vec3::Zero();
   Mat3 axes = Mat3::Identity();  // of the material in the part, columns, world frame

@@ -54,7 +54,7 @@ struct CellsModel {
     bool elastic = true;
     if constexpr (has.plasticity) elastic = !neo_hooke;  // other laws do not flow
     if (elastic) {
-      stress = elastic_stress<has>(g, u, k, now);
+      stress = elastic_stress<has>(g, u, k, fill, now, sums);
       for (int m = 0; m < 4; ++m)
         for (int i = 0; i < 3; ++i) mode_force[m][i] = (0.125 * k.hourglass[m]) * u[i].q[m];
     } else if constexpr (has.plasticity) {
@@ -105,10 +105,11 @@ struct CellsModel {
   }
 
  private:
-  // First Piola-Kirchhoff stress [Pa]; `now` is set where fracture or the books need it.
+  // First Piola-Kirchhoff stress [Pa]; `now` is set where fracture or the books need it. Chains that are drawn beyond
+  // their length end the run as a cell does that folds.
   template <Composition has>
   FLEXEL_INLINE static Matrix elastic_stress(const Gradient& g, const Modes u[3], const CellConstants& k,
-                                             [[maybe_unused]] Elastic& now) {
+                                             const Lanes& fill, [[maybe_unused]] Elastic& now, Sums& sums) {
     if (k.law.name == LawName::neo_hooke) {
       const Lanes log_volume = log1p(g.change);
       if constexpr (has.fracture) now = elastic_state(g, u, g.change, log_volume, k);
@@ -116,7 +117,10 @@ struct CellsModel {
     }
     const Gradient at = g;
     Matrix made;
-    stress_of_law(k.law, at, made);
+    Lanes reserve = Lanes{} + __builtin_huge_val();
+    stress_of_law(k.law, at, made, reserve);
+    reserve = fill > 0 ? reserve : Lanes{} + __builtin_huge_val();
+    sums.smallest_jacobian = reserve >= sums.smallest_jacobian ? sums.smallest_jacobian : reserve;
     if constexpr (has.fracture || has.plasticity) now = elastic_state(g, u, g.change, Lanes{}, k);
     return made;
   }

@@ -5,6 +5,7 @@
 
 #include "base/math/dense.h"
 #include "base/math/eigenvalues.h"
+#include "simulate/laws/arruda_boyce.h"
 #include "simulate/laws/mooney_rivlin.h"
 #include "simulate/laws/neo_hooke_scalar.h"
 #include "simulate/laws/orthotropic.h"
@@ -12,6 +13,7 @@
 namespace flexel::simulate {
 namespace {
 
+using laws::ArrudaBoyce;
 using laws::Matrix;
 using laws::MooneyRivlin;
 using laws::Orthotropic;
@@ -77,6 +79,8 @@ double energy_density(const Law& law, const Mat3& h) {
       return neo_hooke::energy_density(law, h);
     case LawName::mooney_rivlin:
       return MooneyRivlin::energy(law, plain(h));
+    case LawName::arruda_boyce:
+      return ArrudaBoyce::energy(law, plain(h));
     case LawName::orthotropic:
       return Orthotropic::energy(law, plain(h));
   }
@@ -89,6 +93,8 @@ Mat3 first_stress(const Law& law, const Mat3& h) {
       return neo_hooke::first_stress(law, h);
     case LawName::mooney_rivlin:
       return matrix_of(MooneyRivlin::stress(law, laws::kinematics(plain(h))));
+    case LawName::arruda_boyce:
+      return matrix_of(ArrudaBoyce::stress(law, laws::kinematics(plain(h))));
     case LawName::orthotropic:
       return matrix_of(Orthotropic::stress(law, laws::kinematics(plain(h))));
   }
@@ -107,6 +113,8 @@ Mat9 elasticity(const Law& law, const Mat3& h) {
       return neo_hooke::elasticity(law, neo_hooke::tangent(h));
     case LawName::mooney_rivlin:
       return tangent_of([&](const Matrix<double>& d) { return MooneyRivlin::stress_change(law, at, d); });
+    case LawName::arruda_boyce:
+      return tangent_of([&](const Matrix<double>& d) { return ArrudaBoyce::stress_change(law, at, d); });
     case LawName::orthotropic:
       return tangent_of([&](const Matrix<double>& d) { return Orthotropic::stress_change(law, at, d); });
   }
@@ -115,8 +123,13 @@ Mat9 elasticity(const Law& law, const Mat3& h) {
 
 double stiffening(const Law& law, const Mat3& h) {
   if (law.name == LawName::neo_hooke) return neo_hooke::stiffening(law, h);
-  if (!(1 + volume_change(h) > 0)) return std::numeric_limits<double>::infinity();
+  if (!(1 + volume_change(h) > 0) || !(chain_reserve(law, h) > 0))
+    return std::numeric_limits<double>::infinity();
   return largest_eigenvalue(elasticity(law, h)) / law.stiffest;
+}
+
+double chain_reserve(const Law& law, const Mat3& h) {
+  return law.name == LawName::arruda_boyce ? ArrudaBoyce::reserve(law, laws::kinematics(plain(h))) : 1;
 }
 
 Mat6 moduli_at_rest(const Law& law) {
@@ -146,6 +159,18 @@ Law mooney_rivlin_law(double c10, double c01, double bulk) {
   law.c01 = c01;
   law.bulk = bulk;
   law.mu = 2 * (c10 + c01);
+  law.lambda = bulk - 2.0 / 3 * law.mu;
+  law.stiffest = largest_eigenvalue(elasticity(law, Mat3::Zero()));
+  return law;
+}
+
+Law arruda_boyce_law(double mu, double lambda_m, double bulk) {
+  Law law;
+  law.name = LawName::arruda_boyce;
+  law.chains = mu;
+  law.links = lambda_m * lambda_m;
+  law.bulk = bulk;
+  law.mu = mu / 3 * ArrudaBoyce::slope_of(1 - 1 / law.links);
   law.lambda = bulk - 2.0 / 3 * law.mu;
   law.stiffest = largest_eigenvalue(elasticity(law, Mat3::Zero()));
   return law;

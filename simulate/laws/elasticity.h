@@ -17,12 +17,18 @@ namespace flexel::simulate {
 // neo_hooke::stiffening. Infinity for J <= 0.
 [[nodiscard]] double stiffening(const Law& law, const Mat3& gradient);
 
+// What the law's chains are short of their length: 1 - q (arruda_boyce.h). Where it is not above 0 there is no equilibrium,
+// energy and stiffening() are infinite. 1 for laws without chains.
+[[nodiscard]] double chain_reserve(const Law& law, const Mat3& gradient);
+
 // dS/dE at rest (C of small strains), of any law.
 [[nodiscard]] Mat6 moduli_at_rest(const Law& law);
 
 [[nodiscard]] Law neo_hooke_law(double mu, double lambda);
 // C10 + C01 > 0, bulk > 0.
 [[nodiscard]] Law mooney_rivlin_law(double c10, double c01, double bulk);
+// mu > 0, lambda_m > 1, bulk > 0.
+[[nodiscard]] Law arruda_boyce_law(double mu, double lambda_m, double bulk);
 // `compliance` in the material's axes [1/Pa], positive definite; `axes`: from those to the frame of F.
 [[nodiscard]] Law orthotropic_law(const Mat6& compliance, const Mat3& axes);
 

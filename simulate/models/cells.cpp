@@ -3,11 +3,15 @@
 // every sum has a fixed order and the bits do not depend on the number of threads.
 #include "simulate/models/cells.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <type_traits>
 
 #include "base/parallel.h"
+#include "base/units.h"
 #include "simulate/models/prepared_cell.h"
 
 namespace flexel::simulate {
@@ -103,17 +107,20 @@ CellVectors Cells::corner_values(std::uint32_t cell, const std::vector<Vec3>& va
   return u;
 }
 
+std::optional<CellKind> Cells::own_kind(std::uint32_t cell, const State& state) const {
+  if (!rest_shapes_.any()) return std::nullopt;
+  return rest_shapes_.of(kinds_[part_[cell]], body_.parts[part_[cell]], cell, grows_ ? state.share : 1);
+}
+
 template <class Visit>
-auto Cells::with_kind(std::uint32_t cell, const Visit& visit) const {
+auto Cells::with_kind(std::uint32_t cell, const State& state, const Visit& visit) const {
   const std::uint32_t part = part_[cell];
   if (const std::optional<SpringKind>& springs = springs_[part]) {
     if (const auto own = rest_shapes_.any() ? rest_shapes_.of(*springs, cell) : std::nullopt)
       return visit(*own);
     return visit(*springs);
   }
-  if (const auto own =
-          rest_shapes_.any() ? rest_shapes_.of(kinds_[part], body_.parts[part], cell) : std::nullopt)
-    return visit(*own);
+  if (const auto own = own_kind(cell, state)) return visit(*own);
   return visit(kinds_[part]);
 }
 
@@ -121,10 +128,8 @@ bool Cells::may_fold(std::uint32_t cell, const CellVectors& u) const {
   return !springs_[part_[cell]] && !far_from_folding(kinds_[part_[cell]], u);
 }
 
-CornerThresholds Cells::thresholds(std::uint32_t cell) const {
-  const CellKind& kind = kinds_[part_[cell]];
-  return fold_thresholds(
-      kind, rest_shapes_.any() ? rest_shapes_.of(kind, body_.parts[part_[cell]], cell) : std::nullopt);
+CornerThresholds Cells::thresholds(std::uint32_t cell, const State& state) const {
+  return fold_thresholds(kinds_[part_[cell]], own_kind(cell, state));
 }
 
 double Cells::energy(const State& state) const {
@@ -137,8 +142,8 @@ double Cells::energy(const State& state) const {
         // Springs alone would let a cell turn inside out and stay so.
         if (springs_[part_[c]] && !(volume_change(displacement_gradient(kinds_[part_[c]], u)) > -1))
           return std::numeric_limits<double>::infinity();
-        double energy = with_kind(cell, [&](const auto& kind) { return cell_energy(kind, u); });
-        if (may_fold(cell, u)) energy += fold_energy(kinds_[part_[c]], thresholds(cell), u);
+        double energy = with_kind(cell, state, [&](const auto& kind) { return cell_energy(kind, u); });
+        if (may_fold(cell, u)) energy += fold_energy(kinds_[part_[c]], thresholds(cell, state), u);
         return share_[c] * energy;
       },
       kCellGrain);
@@ -152,8 +157,9 @@ void Cells::add_forces(const State& state, std::vector<Vec3>& forces) {
         if (!active_[c]) return;
         const auto cell = static_cast<std::uint32_t>(c);
         const CellVectors u = corner_values(cell, state.displacement);
-        corner_force_[c] = with_kind(cell, [&](const auto& kind) { return cell_forces(kind, u); });
-        if (may_fold(cell, u)) add_fold_forces(kinds_[part_[c]], thresholds(cell), u, corner_force_[c]);
+        corner_force_[c] = with_kind(cell, state, [&](const auto& kind) { return cell_forces(kind, u); });
+        if (may_fold(cell, u))
+          add_fold_forces(kinds_[part_[c]], thresholds(cell, state), u, corner_force_[c]);
         for (Vec3& force : corner_force_[c]) force *= share_[c];
       },
       kCellGrain);
@@ -171,13 +177,13 @@ void Cells::set_stiffness(const State& state, const TangentOptions& tangent, Blo
         if (!active_[c] || springs_[part_[c]]) return;
         const auto cell = static_cast<std::uint32_t>(c);
         const CellVectors u = corner_values(cell, state.displacement);
-        with_kind(cell, [&](const auto& kind) {
+        with_kind(cell, state, [&](const auto& kind) {
           if constexpr (std::is_same_v<std::decay_t<decltype(kind)>, CellKind>)
             prepared[c] = prepare_cell(kind, displacement_gradient(kind, u), tangent.project,
                                        tangent.stress ? &(*tangent.stress)[c] : nullptr);
         });
         if (!may_fold(cell, u)) return;
-        if (const auto folding = fold_tangent(kinds_[part_[c]], thresholds(cell), u, tangent.project))
+        if (const auto folding = fold_tangent(kinds_[part_[c]], thresholds(cell, state), u, tangent.project))
           prepared[c].folding = std::make_unique<FoldTangent>(*folding);
       },
       kCellGrain);
@@ -187,7 +193,7 @@ void Cells::set_stiffness(const State& state, const TangentOptions& tangent, Blo
         Block* row = matrix.values.data() + matrix.row_offsets[e];
         std::fill(row, matrix.values.data() + matrix.row_offsets[e + 1], Block::Zero());
         for (const Incidence& at : stencil_.of(static_cast<std::uint32_t>(e)))
-          with_kind(at.cell, [&](const auto& kind) {
+          with_kind(at.cell, state, [&](const auto& kind) {
             if constexpr (std::is_same_v<std::decay_t<decltype(kind)>, CellKind>)
               add_cell_row(kind, prepared[at.cell], share_[at.cell], at.corner, stencil_.slot[at.cell], row);
             else
@@ -205,7 +211,7 @@ std::vector<Mat3> Cells::predicted_stress(const State& state, const std::vector<
       [&](std::size_t c) {
         if (!active_[c] || springs_[part_[c]]) return;
         const auto cell = static_cast<std::uint32_t>(c);
-        with_kind(cell, [&](const auto& kind) {
+        with_kind(cell, state, [&](const auto& kind) {
           if constexpr (std::is_same_v<std::decay_t<decltype(kind)>, CellKind>)
             stress[c] = simulate::predicted_stress(
                 kind, displacement_gradient(kind, corner_values(cell, state.displacement)),
@@ -245,6 +251,35 @@ SmallestJacobian Cells::smallest_corner_jacobian(const State& state) const {
       },
       kCellGrain);
   return found(smallest);
+}
+
+DrawnChains Cells::drawn_chains(const State& state) const {
+  const auto has_chains = [](const CellKind& kind) { return kind.law.name == LawName::arruda_boyce; };
+  if (std::none_of(kinds_.begin(), kinds_.end(), has_chains)) return {};
+  const Smallest least = parallel_sum<Smallest>(
+      body_.cell_count(),
+      [&](std::size_t c) {
+        const CellKind& kind = kinds_[part_[c]];
+        if (!active_[c] || !has_chains(kind)) return Smallest{};
+        const auto cell = static_cast<std::uint32_t>(c);
+        const Mat3 h = displacement_gradient(kind, corner_values(cell, state.displacement));
+        return Smallest{chain_reserve(kind.law, h), cell};
+      },
+      kCellGrain);
+  if (!(least.value <= 1)) return {};
+  return {std::sqrt(1 - least.value), least.cell};
+}
+
+std::string said_of_chains(const DrawnChains& drawn, const Body& body) {
+  constexpr double kNearTheirEnd = 0.9;
+  if (!(drawn.share > kNearTheirEnd)) return "";
+  const std::uint32_t element = body.cell_elements[drawn.cell][0];
+  const Vec3& at = body.rest[element];
+  return fmt::format(
+      "; near ({}, {}, {}) of part \"{}\" the chains of its law are drawn to {:.3g} % of their "
+      "length, where they end (lambda_m)",
+      human_length(at.x()), human_length(at.y()), human_length(at.z()),
+      body.parts[element_parts(body)[element]].name, 100 * drawn.share);
 }
 
 }  // namespace flexel::simulate

@@ -45,16 +45,16 @@ Mat3 root_less_one(const Mat3& change) {
   return eigen.eigenvectors() * values.asDiagonal() * eigen.eigenvectors().transpose();
 }
 
-// `values`: see simulate/thermal/free_strain.h.
+// `values`: see simulate/thermal/free_strain.h; of them `share`.
 std::optional<CellKind> freely_strained(const CellKind& kind, const Mat3& axes,
-                                        std::span<const double> values) {
-  if (all_zero(values)) return std::nullopt;
+                                        std::span<const double> values, double share) {
+  if (share == 0 || all_zero(values)) return std::nullopt;
   Mat3 change;
   for (std::size_t i = 0; i < 6; ++i)
-    change(kEntry[i][0], kEntry[i][1]) = change(kEntry[i][1], kEntry[i][0]) = values[i];
+    change(kEntry[i][0], kEntry[i][1]) = change(kEntry[i][1], kEntry[i][0]) = share * values[i];
   std::array<Vec3, 4> q;
   q.fill(Vec3::Zero());
-  for (std::size_t m = 0; m < 3; ++m) q[m] = axes * Eigen::Map<const Vec3>(&values[6 + 3 * m]);
+  for (std::size_t m = 0; m < 3; ++m) q[m] = share * (axes * Eigen::Map<const Vec3>(&values[6 + 3 * m]));
   const double volume = 1 / (Mat3::Identity() + change).determinant();
   return with_rest_shape(kind, axes * change * axes.transpose(), volume, q);
 }
@@ -128,8 +128,9 @@ RestShapes::RestShapes(const Body& body)
   any_ = flow_ || volume_ || hourglass_ || springs_ || broken_ || connections_ || free_;
 }
 
-std::optional<CellKind> RestShapes::of(const CellKind& kind, const Part& part, std::uint32_t cell) const {
-  if (free_) return freely_strained(kind, part.lattice.axes, row(free_, cell));
+std::optional<CellKind> RestShapes::of(const CellKind& kind, const Part& part, std::uint32_t cell,
+                                       double share) const {
+  if (free_) return freely_strained(kind, part.lattice.axes, row(free_, cell), share);
   const std::span<const double> flow = row(flow_, cell), hourglass = row(hourglass_, cell);
   const double volume = volume_ ? volume_->values[cell] : 0;
   if (all_zero(flow) && all_zero(hourglass) && volume == 0) return std::nullopt;

@@ -31,8 +31,9 @@ class RestShapes {
 
   // Whether any cell or connection can have a rest shape of its own.
   [[nodiscard]] bool any() const { return any_; }
-  // `kind` for that cell; nothing where its rest shape is the lattice's.
-  [[nodiscard]] std::optional<CellKind> of(const CellKind& kind, const Part& part, std::uint32_t cell) const;
+  // `kind` for that cell; nothing where its rest shape is the lattice's. `share`: of the free strain.
+  [[nodiscard]] std::optional<CellKind> of(const CellKind& kind, const Part& part, std::uint32_t cell,
+                                           double share = 1) const;
   [[nodiscard]] std::optional<SpringKind> of(const SpringKind& kind, std::uint32_t cell) const;
   // Change of the rest length of a connection of model `paper` [m]: of bit `bit` of element `element`.
   [[nodiscard]] double of_connection(std::uint32_t element, std::size_t bit) const;

@@ -38,18 +38,35 @@ void parse_neo_hooke(TableReader& reader, Material& material) {
   material.poisson = *reader.number("poisson");
 }
 
+// `of`, words for mu / `times`.
+void refuse_bulk(TableReader& reader, double bulk, double mu, const char* of, int times) {
+  if (!(bulk > 0)) reader.fail("\"bulk\" needs to be above 0");
+  constexpr double kStiffest = 1e4;  // times mu: beyond, volume locks and the solver fails
+  if (bulk > kStiffest * mu)
+    reader.fail(
+        fmt::format("\"bulk\" is more than {:.0f} times {}: take a smaller one; a thousand times is "
+                    "incompressible",
+                    times * kStiffest, of));
+}
+
 void parse_mooney_rivlin(TableReader& reader, Material& material) {
   material.c10 = pressure(reader, "c10", "\"0.3 MPa\"");
   material.c01 = pressure(reader, "c01", "\"0.1 MPa\"");
   material.bulk = pressure(reader, "bulk", "\"40 MPa\"");
   if (!(material.c10 >= 0 && material.c01 >= 0 && material.c10 + material.c01 > 0))
     reader.fail("\"c10\" and \"c01\" need to be 0 or more, and one of them above 0");
-  if (!(material.bulk > 0)) reader.fail("\"bulk\" needs to be above 0");
-  constexpr double kStiffest = 1e4;  // times mu: beyond, volume locks and the solver fails
-  if (material.bulk > kStiffest * 2 * (material.c10 + material.c01))
-    reader.fail(
-        "\"bulk\" is more than 20000 times c10 + c01: take a smaller one; a thousand times is "
-        "incompressible");
+  refuse_bulk(reader, material.bulk, 2 * (material.c10 + material.c01), "c10 + c01", 2);
+}
+
+void parse_arruda_boyce(TableReader& reader, Material& material) {
+  material.chain_mu = pressure(reader, "mu", "\"0.27 MPa\"");
+  (void)reader.require("lambda_m", "5.15, the stretch at which the chains end");
+  material.lambda_m = *reader.number("lambda_m");
+  material.bulk = pressure(reader, "bulk", "\"40 MPa\"");
+  if (!(material.chain_mu > 0)) reader.fail("\"mu\" needs to be above 0");
+  if (!(material.lambda_m > 1.01 && material.lambda_m <= 1e3))
+    reader.fail("\"lambda_m\", the stretch at which the chains end, needs to be above 1.01 and at most 1000");
+  refuse_bulk(reader, material.bulk, law_of(material).mu, "the shear modulus at small strain", 1);
 }
 
 void parse_orthotropic(TableReader& reader, Material& material) {
@@ -82,13 +99,17 @@ void parse_law(TableReader& reader, Material& material) {
   } else if (law == "mooney-rivlin") {
     material.law = LawName::mooney_rivlin;
     parse_mooney_rivlin(reader, material);
+  } else if (law == "arruda-boyce") {
+    material.law = LawName::arruda_boyce;
+    parse_arruda_boyce(reader, material);
   } else if (law == "orthotropic") {
     material.law = LawName::orthotropic;
     parse_orthotropic(reader, material);
   } else {
-    reader.fail(reader.find("law")->line,
-                fmt::format("no law \"{}\"{}; known: neo-hooke, mooney-rivlin, orthotropic", law,
-                            did_you_mean(law, {"neo-hooke", "mooney-rivlin", "orthotropic"})));
+    reader.fail(
+        reader.find("law")->line,
+        fmt::format("no law \"{}\"{}; known: neo-hooke, mooney-rivlin, arruda-boyce, orthotropic", law,
+                    did_you_mean(law, {"neo-hooke", "mooney-rivlin", "arruda-boyce", "orthotropic"})));
   }
   set_isotropic_constants(material);
 }

@@ -51,6 +51,14 @@ std::string fastest_near(const Body& body, const State& state) {
 
 std::string where_it_folds(const Problem& problem, const State& state) {
   if (problem.body.cell_count() == 0) return "an element's position is not a number";
+  const Stencil none;
+  const DrawnChains drawn = Cells(problem, none).drawn_chains(state);
+  if (drawn.share >= 1)
+    return fmt::format(
+        "a cell near {} is drawn further than the chains of its law are long (lambda_m): load it more "
+        "slowly, "
+        "damp it ([damping]), or use a shorter [run] step",
+        place(rest_of(problem, drawn.cell)));
   return folds_at("a cell", rest_of(problem, smallest(problem, state).cell));
 }
 
@@ -63,8 +71,9 @@ std::string squeezed_most(const Problem& problem, const State& state) {
                        least.value);
   }
   const SmallestJacobian most = smallest(problem, state);
-  return fmt::format(", squeezed most near {}, to J = {:.2g}", place(rest_of(problem, most.cell)),
-                     most.value);
+  const Stencil none;
+  return fmt::format(", squeezed most near {}, to J = {:.2g}{}", place(rest_of(problem, most.cell)),
+                     most.value, said_of_chains(Cells(problem, none).drawn_chains(state), problem.body));
 }
 
 std::string damping_too_long(int stages) {

@@ -52,6 +52,31 @@ TEST(Outputs, OneFileByTwoNamesIsFound) {
       ThrowsMessage<InputError>(HasSubstr("two results would go to stdout")));
 }
 
+TEST(Outputs, NamesOfManyFilesKeepInputs) {
+  const Scratch scratch;
+  const auto refused = [&](const char* output, const std::string& input) {
+    try {
+      check_outputs({{scratch.path(output)}}, {input}, false);
+    } catch (const InputError& error) {
+      return std::string(error.what()).find("is an input of this command") != std::string::npos;
+    }
+    return false;
+  };
+  const std::string frame = scratch.write("a[1]*_00012.vtu", ""),
+                    other = scratch.write("a[1]*_00012b.vtu", "");
+  EXPECT_TRUE(refused("a[1]*.pvd", frame));
+  EXPECT_TRUE(refused("a[1]*.PVD", frame));
+  EXPECT_TRUE(refused("a[1]*_{frame}.vtu", frame));
+  EXPECT_TRUE(refused("{part}.vtu", frame));
+  EXPECT_FALSE(refused("a[1]*.pvd", other));
+  EXPECT_FALSE(refused("a[1]x.pvd", frame));
+  EXPECT_FALSE(refused("{part}.stl", frame));
+  EXPECT_NO_THROW(check_outputs({{scratch.path("a[1]*.pvd")}}, {frame}, true));
+  std::filesystem::create_hard_link(other, scratch.path("b_1.vtu"));
+  EXPECT_TRUE(refused("b.pvd", other));
+  EXPECT_TRUE(refused("b.pvd", scratch.path("./b_1.vtu")));
+}
+
 TEST(Outputs, AppearTogetherOrNotAtAll) {
   const Scratch scratch;
   const std::string first = scratch.write("first", "old"), second = scratch.path("second");

@@ -66,6 +66,27 @@ def test_frames_of_a_series_are_not_replaced():
     refused("flexel-map", "f.pvd", "-o", "f.vtu", what="f_00000.vtu: is an input")
 
 
+def test_frames_and_files_of_parts_do_not_replace_what_is_read():
+    """A series and "{part}" are names of many files."""
+    box()
+    body("f_00002.vtu")
+    falls = write("falls.toml", 'material = "steel"\n[gravity]\nacceleration = ["0 m/s2", "0 m/s2", "-9.81 m/s2"]\n'
+                                '[run]\ntime = "3 us"\nframes = 3\n')
+    refused("flexel-simulate", falls, "f_00002.vtu", "-o", "f.pvd", what="f_00002.vtu: is an input of this command and fits")
+    os.symlink("f_00002.vtu", "g_00001.vtu")  # which would be written through
+    refused("flexel-simulate", falls, "f_00002.vtu", "-o", "g.pvd", what="g_00001.vtu: is an input")
+    os.rename("f_00002.vtu", "f_2b.vtu")
+    expect_ok(run("flexel-simulate", falls, "f_2b.vtu", "-o", "f.pvd", "--quiet"))
+    box("f_00001.stl")
+    refused("flexel-map", "f.pvd", "--onto", "f_00001.stl", "-o", "f.stl", what="f_00001.stl: is an input")
+    how = ["--material", "steel", "--fix", "xmin", "--push", "xmax: 0 0 -1 N", "--size", "5 mm"]
+    refused("flexel", "deform", "box.stl", *how, "-o", "{part}.stl", what="box.stl: is an input")
+    expect_ok(run("flexel-voxelize", "box.stl", "--size", "5 mm", "-o", "own.vtu", "--quiet"))
+    refused("flexel-map", "own.vtu", "-o", "{part}.stl", what="box.stl: is the part")
+    expect_ok(run("flexel", "deform", "box.stl", *how, "-o", "bent_{part}.stl", "--quiet"))
+    expect_ok(run("flexel", "deform", "box.stl", *how, "-o", "{part}.stl", "--force", "--quiet"))
+
+
 def test_deform_export_and_picture_do_not_replace_the_part():
     box()
     how = ["--material", "steel", "--fix", "xmin", "--push", "xmax: 0 0 -1 N"]

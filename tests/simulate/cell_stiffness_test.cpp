@@ -52,6 +52,7 @@ Scene held_scene(LawName law = LawName::neo_hooke) {
   Scene scene;
   scene.materials["gum"] = {"gum", kGumYoung, 0.3, 580, "test"};
   if (law == LawName::mooney_rivlin) scene.materials["gum"] = testing::mooney_rivlin_material();
+  if (law == LawName::arruda_boyce) scene.materials["gum"] = testing::arruda_boyce_material();
   if (law == LawName::orthotropic) scene.materials["gum"] = testing::orthotropic_material();
   scene.material = "gum";
   scene.get<Supports>().ties.push_back(make_fix(select_by_name("near/x0")));
@@ -137,7 +138,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 std::vector<TangentCase> of_other_laws() {
   std::vector<TangentCase> cases;
-  for (const LawName law : {LawName::mooney_rivlin, LawName::orthotropic})
+  for (const LawName law : {LawName::mooney_rivlin, LawName::arruda_boyce, LawName::orthotropic})
     for (const bool project : {false, true})
       for (const bool stressed : {false, true})
         for (const double squeeze : {0.0, 0.1})

@@ -35,6 +35,7 @@ TEST(DampingMatrix, IsTheKernelsDamping) {
   for (const auto& [model, material] : {std::pair{Model::cells, Material{"gum", 1e6, 0.25, 1000, "test"}},
                                         {Model::springs, Material{"gum", 1e6, 0.25, 1000, "test"}},
                                         {Model::cells, testing::mooney_rivlin_material()},
+                                        {Model::cells, testing::arruda_boyce_material()},
                                         {Model::cells, testing::orthotropic_material()}}) {
     BoxOptions options;
     options.cells = {3, 2, 2};

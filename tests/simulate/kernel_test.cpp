@@ -199,8 +199,27 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(KernelCase{"cells", Model::cells, kKernelGum},
                       KernelCase{"springs", Model::springs, kKernelGum},
                       KernelCase{"mooney_rivlin", Model::cells, testing::mooney_rivlin_material()},
+                      KernelCase{"arruda_boyce", Model::cells, testing::arruda_boyce_material()},
                       KernelCase{"orthotropic", Model::cells, testing::orthotropic_material()}),
     name_of);
+
+// Cells without fill may be drawn as far as they like.
+TEST(Kernel, ChainsBeyondTheirLengthAreTold) {
+  Body body = box_body({{9, 1, 1}, Vec3::Constant(0.01)});
+  const Problem problem = testing::problem_of(body, testing::arruda_boyce_material(), Model::cells);
+  for (const bool filled : {true, false})
+    for (const double stretch : {3.0, 3.5}) {  // they end at 3.37
+      body.fill.assign(body.cell_count(), filled ? 1 : 0);
+      State state = testing::at_rest(body);
+      for (std::size_t e = 0; e < body.element_count(); ++e)
+        state.displacement[e] = body.rest[e].cwiseProduct(
+            Vec3(stretch, 1 / std::sqrt(stretch), 1 / std::sqrt(stretch)) - Vec3::Ones());
+      Stepper stepper(problem, {{0}}, false);
+      const double reached = stepper.advance(state, {}, {1e-9, 1e-9, false}).smallest_jacobian;
+      EXPECT_EQ(reached > 0, !filled || stretch < 3.37) << stretch << filled;
+      for (const Vec3& velocity : state.velocity) EXPECT_TRUE(velocity.allFinite());
+    }
+}
 
 TEST(Kernel, FoldedCellIsTold) {
   const Body body = box_body({{2, 2, 2}, Vec3::Constant(0.01)});

@@ -18,6 +18,19 @@ inline Material mooney_rivlin_material() {
   return material;
 }
 
+// Its chains end at the stretch of 2.
+inline Material arruda_boyce_material() {
+  Material material;
+  material.name = "chains";
+  material.law = LawName::arruda_boyce;
+  material.chain_mu = 0.3e6;
+  material.lambda_m = 2;
+  material.bulk = 1.6e6;
+  material.density = 1000;
+  set_isotropic_constants(material);
+  return material;
+}
+
 // Of a soft wood's ratios, its axes turned in space.
 inline Material orthotropic_material() {
   Material material;

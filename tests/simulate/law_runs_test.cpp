@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/error.h"
 #include "base/math/dense.h"
 #include "simulate/laws/elasticity.h"
 #include "tests/simulate/law_materials.h"
@@ -31,6 +32,16 @@ material = "elastomer"
 law = "mooney-rivlin"
 c10 = "0.15 MPa"
 c01 = "0.05 MPa"
+bulk = "1.6 MPa"
+density = "1000 kg/m3"
+)";
+
+constexpr const char* kChains = R"(
+material = "chains"
+[materials.chains]
+law = "arruda-boyce"
+mu = "0.3 MPa"
+lambda_m = 2
 bulk = "1.6 MPa"
 density = "1000 kg/m3"
 )";
@@ -115,21 +126,71 @@ Drawn drawn_to(const Law& law, double stretch) {
   return {first_stress(law, h)(0, 0), energy_density(law, h)};
 }
 
+void expect_drawn(const char* material, const Law& law, double stretch) {
+  Body body = long_bar();
+  const Drawn drawn = drawn_to(law, stretch);
+  const SimulateResult result =
+      at_equilibrium(body, std::string(material) + kDrawnBar + drawn_by(kArea * drawn.stress));
+  EXPECT_NEAR(1 + result.probes[0].displacement.x() / kLength, stretch, 1e-6);
+  EXPECT_NEAR(result.elastic_energy / (drawn.energy * kArea * kLength), 1, 1e-5);
+}
+
 TEST(LawRuns, MooneyRivlinBarDrawn) {
-  const Law law = law_of(testing::mooney_rivlin_material());
-  for (const double stretch : {1.1, 1.5, 2.0}) {
-    Body body = long_bar();
-    const Drawn drawn = drawn_to(law, stretch);
-    const SimulateResult result =
-        at_equilibrium(body, std::string(kElastomer) + kDrawnBar + drawn_by(kArea * drawn.stress));
-    EXPECT_NEAR(1 + result.probes[0].displacement.x() / kLength, stretch, 1e-6);
-    EXPECT_NEAR(result.elastic_energy / (drawn.energy * kArea * kLength), 1, 1e-5);
+  for (const double stretch : {1.1, 1.5, 2.0})
+    expect_drawn(kElastomer, law_of(testing::mooney_rivlin_material()), stretch);
+}
+
+// Far beyond the stretch of 3.37 at which chains of matter that keeps its volume end: this swells.
+TEST(LawRuns, ArrudaBoyceBarDrawn) {
+  const Law law = law_of(testing::arruda_boyce_material());
+  for (const double stretch : {1.1, 2.0, 3.0, 4.0}) expect_drawn(kChains, law, stretch);
+}
+
+// Cells that are held all around cannot swell, so their chains end at a stretch of 6.3. What is led beyond, or finds no
+// equilibrium near it, says why in one line.
+TEST(LawRuns, NothingIsDrawnBeyondTheLengthOfItsChains) {
+  const std::string led =
+      std::string(kChains) +
+      "[[fix]]\nwhere = \"x0\"\n[[move]]\nwhere = \"x1\"\ndisplacement = [\"70 mm\", 0, 0]\n";
+  const auto sheet = [] { return testing::box_body({.cells = {1, 2, 2}, .spacing = Vec3::Constant(0.01)}); };
+  Body body = sheet();
+  try {
+    (void)at_equilibrium(body, led + "[run]\nnewton_iterations = 6\n");
+    ADD_FAILURE() << "found in six iterations";
+  } catch (const DivergedError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("the chains of its law are drawn to 9"));
+    EXPECT_THAT(error.what(), HasSubstr("lambda_m"));
   }
+  for (const char* method : {"symplectic", "implicit"}) {
+    try {
+      (void)testing::run_timed(sheet(), parse_scene(led + "[run]\ntime = \"50 ms\"\nmethod = \"" + method +
+                                                        "\"\n[damping]\ntime = \"2 ms\"\n",
+                                                    "s.toml"));
+      ADD_FAILURE() << method;
+    } catch (const DivergedError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("lambda_m")) << method;
+    }
+  }
+}
+
+// Thrown to the end of its chains and back: they stop it, and its energy stays.
+TEST(LawRuns, ChainsStopWhatIsThrown) {
+  const testing::TimedCase made = testing::run_timed(
+      long_bar(),
+      parse_scene(
+          std::string(kChains) + kDrawnBar +
+              "[[velocity]]\nwhere = { half_space = { point = [\"35 mm\", 0, 0], normal = [1, 0, 0] } "
+              "}\nvelocity = [\"25 m/s\", 0, 0]\n[run]\ntime = \"10 ms\"\n",
+          "s.toml"));
+  testing::expect_books_close(made.result);
+  const std::vector<double>& x = made.history.column("end x");
+  EXPECT_GT(*std::max_element(x.begin(), x.end()), 1.5 * kLength);
+  EXPECT_LT(*std::max_element(x.begin(), x.end()), 2.5 * kLength);
 }
 
 // What swings with damping comes to rest where equilibrium is, far from small strains.
 TEST(LawRuns, InTimeEndsAtEquilibrium) {
-  for (const std::string& material : {std::string(kElastomer), std::string(kGrain)}) {
+  for (const std::string& material : {std::string(kElastomer), std::string(kChains), std::string(kGrain)}) {
     const std::string held = R"(
 [[fix]]
 where = { box = { min = ["-1 mm", "-1 mm", "-1 mm"], max = ["1 mm", "21 mm", "21 mm"] } }
@@ -177,7 +238,7 @@ TEST(LawRuns, NearlyIncompressibleMatterCreepsInItsDampingTime) {
 
 // A free bar that is thrown and wrung keeps its momenta and, undamped, its energy.
 TEST(LawRuns, FreeMotionKeepsMomentaAndEnergy) {
-  for (const std::string& material : {std::string(kElastomer), std::string(kGrain)}) {
+  for (const std::string& material : {std::string(kElastomer), std::string(kChains), std::string(kGrain)}) {
     const std::string scene =
         material +
         "[[velocity]]\nwhere = { half_space = { point = [\"35 mm\", 0, 0], normal = [1, 0, 0] } }\nvelocity "
@@ -206,10 +267,17 @@ TEST(LawRuns, WhatIsNoMaterialIsRefused) {
   EXPECT_THAT(testing::refusal(with(kElastomer, "c01 = \"0.05 MPa\"\n", "")), HasSubstr("c01"));
   EXPECT_THAT(testing::refusal(with(kElastomer, "1.6 MPa", "0 MPa")),
               HasSubstr("\"bulk\" needs to be above 0"));
+  EXPECT_THAT(testing::refusal(with(kChains, "lambda_m = 2", "lambda_m = 1")), HasSubstr("\"lambda_m\""));
+  EXPECT_THAT(testing::refusal(with(kChains, "lambda_m = 2\n", "")), HasSubstr("lambda_m"));
+  EXPECT_THAT(testing::refusal(with(kChains, "0.3 MPa", "0 MPa")), HasSubstr("\"mu\" needs to be above 0"));
+  EXPECT_THAT(testing::refusal(with(kChains, "1.6 MPa", "9 GPa")), HasSubstr("10000 times"));
   EXPECT_THAT(testing::refusal(with(kElastomer, "c10 =", "young = \"1 MPa\"\nc10 =")), HasSubstr("young"));
 }
 
 TEST(LawRuns, WhatALawCannotDoIsRefusedByName) {
+  for (const char* model : {"springs", "paper"})
+    EXPECT_THAT(testing::refusal(std::string(kChains) + "[parts.box]\nmodel = \"" + model + "\"\n"),
+                HasSubstr(model));
   const std::string grain = kGrain, run = "[[fix]]\nwhere = \"x0\"\n";
   EXPECT_THAT(testing::refusal(grain + "[parts.box]\nmodel = \"springs\"\n" + run),
               HasSubstr("needs model \"cells\", not \"springs\""));

@@ -14,11 +14,13 @@
 namespace flexel::simulate {
 namespace {
 
+using testing::arruda_boyce_material;
 using testing::mooney_rivlin_material;
 using testing::orthotropic_material;
 
 std::vector<Law> laws_to_test() {
-  return {neo_hooke_law(0.8e6, 2e6), law_of(mooney_rivlin_material()), law_of(orthotropic_material())};
+  return {neo_hooke_law(0.8e6, 2e6), law_of(mooney_rivlin_material()), law_of(arruda_boyce_material()),
+          law_of(orthotropic_material())};
 }
 
 Mat3 random_gradient(std::mt19937& engine, double size) {
@@ -74,7 +76,7 @@ TEST(Laws, StiffeningBoundsTheTangent) {
     for (const double size : {0.05, 0.2, 0.4})
       for (int round = 0; round < 30; ++round) {
         const Mat3 h = random_gradient(engine, size);
-        if (!(volume_change(h) > -0.9)) continue;
+        if (!(volume_change(h) > -0.9) || !(chain_reserve(law, h) > 0)) continue;
         EXPECT_LE(largest(law, h), (1 + 1e-9) * stiffening(law, h) * largest(law, Mat3::Zero()));
       }
 }
@@ -104,7 +106,9 @@ TEST(Laws, IsotropicLimits) {
   even.shears.setConstant(mu);
   even.axes = orthotropic_material().axes;
   const Mat9 expected = elasticity(neo, Mat3::Zero());
-  for (const Law& law : {mooney_rivlin_law(mu / 2, 0, bulk), law_of(even)}) {
+  const double links = 4, slope = 2 / (1 - 1 / links) + 1 - 0.2 / links - 0.4 / (links * links);
+  for (const Law& law : {mooney_rivlin_law(mu / 2, 0, bulk), law_of(even),
+                         arruda_boyce_law(3 * mu / slope, std::sqrt(links), bulk)}) {
     EXPECT_LT((elasticity(law, Mat3::Zero()) - expected).norm(), 1e-10 * expected.norm());
     EXPECT_NEAR(law.mu / mu, 1, 1e-12);
     EXPECT_NEAR(law.lambda / lambda, 1, 1e-12);
@@ -145,6 +149,80 @@ TEST(Laws, MooneyRivlinUnderUniaxialStress) {
     for (int i = 0; i < 200; ++i) (at(0.5 * (low + high))(1, 1) > 0 ? high : low) = 0.5 * (low + high);
     const double expected = 2 * (stretch * stretch - 1 / stretch) * (0.3e6 + 0.1e6 / stretch);
     EXPECT_NEAR(at(0.5 * (low + high))(0, 0) / expected, 1, 1e-4) << stretch;
+  }
+}
+
+// J = 1, drawn along x: what Cauchy's stress differs in along and across.
+double drawn_difference(const Law& law, double stretch) {
+  Mat3 h = Mat3::Zero();
+  h.diagonal() = Vec3(stretch, 1 / std::sqrt(stretch), 1 / std::sqrt(stretch)) - Vec3::Ones();
+  const Mat3 stress = cauchy_stress(law, h);
+  return stress(0, 0) - stress(1, 1);
+}
+
+// coth x - 1/x
+double langevin(double x) {
+  return x < 1e-4 ? x / 3 : 1 / std::tanh(x) - 1 / x;
+}
+
+// sigma = mu/3 sqrt N / lambda_chain L^-1(lambda_chain / sqrt N) (l^2 - 1/l), lambda_chain^2 = (l^2 + 2/l) / 3 (Arruda and Boyce
+// 1993, equation 15), L^-1 by bisection, up to 99.9 % of the chains' length.
+TEST(Laws, ArrudaBoyceIsThatOfLangevin) {
+  const double mu = 0.27e6, lambda_m = 5.148;
+  const Law law = arruda_boyce_law(mu, lambda_m, 1e9);
+  double longest = 0;
+  for (const double stretch : {0.05, 0.3, 0.9, 1.001, 1.5, 3.0, 5.0, 7.0, 8.0, 8.8, 8.9}) {
+    const double chain = std::sqrt((stretch * stretch + 2 / stretch) / 3), share = chain / lambda_m;
+    ASSERT_LT(share, 1) << stretch;
+    longest = std::max(longest, share);
+    double low = 0, high = 1e6;
+    for (int i = 0; i < 200; ++i) (langevin(0.5 * (low + high)) < share ? low : high) = 0.5 * (low + high);
+    const double expected = mu / 3 * low / share * (stretch * stretch - 1 / stretch);
+    EXPECT_NEAR(drawn_difference(law, stretch) / expected, 1, 0.003) << stretch;
+  }
+  EXPECT_GT(longest, 0.995);
+}
+
+// Long chains: neo-Hooke's with the same shear modulus, to order 1 / lambda_m^2.
+TEST(Laws, ArrudaBoyceOfLongChainsIsNeoHooke) {
+  double before = 1;
+  for (const double lambda_m : {20.0, 40.0, 80.0}) {
+    const Law law = arruda_boyce_law(0.3e6, lambda_m, 1e8), plain = mooney_rivlin_law(law.mu / 2, 0, 1e8);
+    const double off = std::abs(drawn_difference(law, 3) / drawn_difference(plain, 3) - 1);
+    EXPECT_LT(off, 10 / (lambda_m * lambda_m));
+    EXPECT_LT(off, before / 3.5);
+    before = off;
+  }
+}
+
+// At the end of the chains energy, stress and the speed of waves grow without bound, and beyond it nothing is not a number.
+TEST(Laws, ChainsEnd) {
+  const Law law = law_of(arruda_boyce_material());
+  const auto drawn = [](double stretch) {
+    Mat3 h = Mat3::Zero();
+    h.diagonal() = Vec3(stretch, 1 / std::sqrt(stretch), 1 / std::sqrt(stretch)) - Vec3::Ones();
+    return h;
+  };
+  double low = 1, high = 10;  // where they end: l^2 + 2/l = 3 lambda_m^2
+  for (int i = 0; i < 200; ++i)
+    (chain_reserve(law, drawn(0.5 * (low + high))) > 0 ? low : high) = 0.5 * (low + high);
+  EXPECT_NEAR(low * low + 2 / low, 12, 1e-9);
+  double energy = 0, stress = 0, speed = 0;
+  for (const double short_of : {1e-1, 1e-2, 1e-3, 1e-4}) {
+    const Mat3 h = drawn(low * (1 - short_of));
+    EXPECT_GT(energy_density(law, h), energy);
+    EXPECT_GT(first_stress(law, h)(0, 0), 5 * stress);
+    EXPECT_GT(stiffening(law, h), 20 * speed);
+    energy = energy_density(law, h);
+    stress = first_stress(law, h)(0, 0);
+    speed = stiffening(law, h);
+  }
+  for (const double beyond : {1 + 1e-9, 1.5, 10.0}) {
+    const Mat3 h = drawn(beyond * low);
+    EXPECT_EQ(energy_density(law, h), std::numeric_limits<double>::infinity());
+    EXPECT_EQ(stiffening(law, h), std::numeric_limits<double>::infinity());
+    EXPECT_TRUE(first_stress(law, h).allFinite());
+    EXPECT_TRUE(elasticity(law, h).allFinite());
   }
 }
 

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "simulate/scene/scene.h"
+#include "simulate/thermal/free_strain.h"
 #include "tests/simulate/centre_body.h"
 #include "tests/simulate/derivatives.h"
 #include "tests/simulate/scene_case.h"
@@ -204,6 +205,40 @@ TEST(RestShape, FrozenBarIsLedFromItsShape) {
   EXPECT_NEAR(y / count, 20e-3, 0.2e-3);
   EXPECT_NEAR(z / count, 0, 0.2e-3);
   EXPECT_GT(back.elastic_energy, 0);
+}
+
+// An even free strain of a free body: at a share of the load it is at rest where that share of it has moved it.
+TEST(GrowingFreeStrain, IsFreeOfForceAtItsShare) {
+  BoxOptions options;
+  options.cells = {3, 2, 2};
+  options.spacing = Vec3::Constant(kRestSpacing);
+  options.axes = turned_axes();
+  Body body = box_body(options);
+  const Mat3& axes = body.parts[0].lattice.axes;
+  // G - I: xx, yy, zz, xy, yz, zx; the same all over a cell
+  const double strain[18] = {0.2, -0.1, 0.05, 0.04, -0.03, 0.02};
+  Column& column = body.cell_columns[kFreeStrainColumn];
+  column.components = 18;
+  for (std::size_t c = 0; c < body.cell_count(); ++c)
+    column.values.insert(column.values.end(), std::begin(strain), std::end(strain));
+  Mat3 change;
+  change << strain[0], strain[3], strain[5], strain[3], strain[1], strain[4], strain[5], strain[4], strain[2];
+  change = axes * change * axes.transpose();
+  Mechanics mechanics(
+      {body, {{"gum", kGumYoung, 0.25, 1000, ""}}, {}, {Model::cells}, {HookeConstant::paper}, {}}, {});
+  ASSERT_TRUE(mechanics.has_free_strain());
+  const double scale = kGumYoung * kRestSpacing * kRestSpacing;
+  for (const bool grows : {true, false})
+    for (const double share : {0.0, 0.4, 1.0}) {
+      mechanics.grow_free_strain(grows);
+      State state{std::vector<Vec3>(body.element_count()), share};
+      const Mat3 free = (Mat3::Identity() + (grows ? share : 1) * change).inverse() - Mat3::Identity();
+      for (std::size_t e = 0; e < body.element_count(); ++e) state.displacement[e] = free * body.rest[e];
+      EXPECT_LT(mechanics.energy(state), 1e-24 * scale * kRestSpacing) << grows << share;
+      for (const Vec3& force : mechanics.forces(state).total) EXPECT_LT(force.norm(), 1e-12 * scale);
+      state.displacement = random_displacements(body, 0.05 * kRestSpacing, 5);
+      testing::expect_derivatives(mechanics, state, kGumYoung, kRestSpacing, 7);
+    }
 }
 
 }  // namespace
