@@ -90,15 +90,22 @@ void restore_followers(Mechanics& mechanics, const FollowerMemory& memory) {
 class LoadStepping {
  public:
   LoadStepping(Mechanics& mechanics, State& state, const RunSettings& settings, Progress& progress,
-               const CoarseStart& start)
+               const CoarseStart& start, const LoadStepHooks* hooks)
       : mechanics_(mechanics),
         state_(state),
         settings_(settings),
         progress_(progress),
         start_(start),
+        hooks_(hooks),
         first_(1.0 / std::max(settings.load_steps, least_load_steps(mechanics))),
         length_(first_) {
     indented_ = find_indenters(mechanics.effects()) != nullptr;
+    if (hooks && hooks->make_solver) solver_ = hooks->make_solver(mechanics);
+    if (!hooks || !hooks->begin) return;
+    done_ = hooks->begin->share;
+    reach_ = hooks->begin->reach;
+    state_.displacement = hooks->begin->displacement;
+    state_.share = done_;
   }
 
   EquilibriumResult operator()();
@@ -133,7 +140,9 @@ class LoadStepping {
   const RunSettings& settings_;
   Progress& progress_;
   const CoarseStart& start_;
-  double first_;  // share of the load: the first step; none is longer
+  const LoadStepHooks* hooks_;  // may be null
+  LoadStepSolver solver_;       // empty: newton_with_links()
+  double first_;                // share of the load: the first step; none is longer
   LoadStepLength length_;
   double done_ = 0;                  // share of the load
   double begun_ = kBeforeFirstStep;  // share of the run's time that its start takes
@@ -206,13 +215,14 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   if (reach_ == 0) preparing.emplace(progress_, kBeforeSearch, kBeforeFirstStep, "preparing");
   const std::vector<RigidLink> links = links_now(mechanics_.constraints());
   double most_gone = 0;  // a residual may rise again
-  outcome_ = newton_with_links(mechanics_, trial_, options, [&](double gone, const std::string& note) {
+  const NewtonProgress tell = [&](double gone, const std::string& note) {
     check_stop();
     preparing.reset();
     most_gone = std::max(most_gone, gone);
     progress_.update(begun_ + (1 - begun_) * (done_ + most_gone * (trial_.share - done_)),
                      fmt::format("load {:.3g} %, {}", 100 * trial_.share, note));
-  });
+  };
+  outcome_ = solver_ ? solver_(trial_, options, tell) : newton_with_links(mechanics_, trial_, options, tell);
   if (reach_ == 0) reach_ = outcome_.first_reach / trial_.share;  // from rest: a near start moves by less
   result_.newton_iterations += outcome_.iterations;
   result_.cg_iterations += outcome_.cg_iterations;
@@ -226,6 +236,7 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   for (const ActiveEffect& effect : mechanics_.effects()) effect->accept(state_);
   ++result_.load_steps;
   result_.relative_residual = outcome_.relative_residual;
+  if (hooks_ && hooks_->done) hooks_->done({done_, reach_, state_.displacement});
   length_.succeeded(outcome_.iterations <= kEasyIterations);
   return true;
 }
@@ -378,6 +389,11 @@ void LoadStepping::solve() {
 
 }  // namespace
 
+std::shared_ptr<const LoadStepHooks> hooks_on_coarser(const std::shared_ptr<const LoadStepHooks>& hooks) {
+  if (!hooks) return nullptr;
+  return std::make_shared<const LoadStepHooks>(LoadStepHooks{hooks->make_solver, {}, {}});
+}
+
 FollowerMemory follower_memory(const Mechanics& mechanics) {
   FollowerMemory memory;
   for (const ActiveEffect& effect : mechanics.effects())
@@ -453,8 +469,8 @@ double linear_reach_beside_free_strain(Mechanics& mechanics) {
 }
 
 EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state, const RunSettings& settings,
-                                   Progress& progress, const CoarseStart& start) {
-  return LoadStepping(mechanics, state, settings, progress, start)();
+                                   Progress& progress, const CoarseStart& start, const LoadStepHooks* hooks) {
+  return LoadStepping(mechanics, state, settings, progress, start, hooks)();
 }
 
 }  // namespace flexel::simulate
