@@ -251,6 +251,8 @@ double NewtonSnes::reach_of(Vec way) {
 
 // One step along -`way`; `displacement` and `negative`, its residual, become those at its end. False where there is none.
 bool NewtonSnes::step(Vec displacement, Vec negative, Vec way) {
+  // Conjugate gradients leave the prescribed components at zero up to their tolerance only.
+  ok(VecPointwiseMult(way, way, system_.free()));
   if (outcome_.iterations == 0) outcome_.first_reach = reach_of(way);
   if (outcome_.first_reach > options_.farthest_reach) return false;
   // What the linear model leaves over.

@@ -11,7 +11,8 @@ from harness import BIN, Skip, expect, expect_error, expect_ok, expect_only, bod
 
 PROGRAM = "flexel-simulate-mpi"
 ENVIRONMENT = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1", OMPI_MCA_rmaps_base_oversubscribe="1",
-                   OMPI_MCA_btl_base_warn_component_unused="0", OMPI_MCA_hwloc_base_binding_policy="none")
+                   OMPI_MCA_hwloc_base_binding_policy="none",
+                   OMPI_MCA_mpi_yield_when_idle="1")
 MPIRUN = ("mpirun", "--quiet", "-n")
 
 SMALL = """material = "steel"
@@ -40,7 +41,7 @@ where = { box = { min = ["-1 mm", "-1 mm", "-1 mm"], max = ["1 mm", "11 mm", "11
 [[move]]
 name = "led"
 where = { box = { min = ["39 mm", "-1 mm", "-1 mm"], max = ["41 mm", "11 mm", "11 mm"] } }
-displacement = ["-4 mm", "free", "12 mm"]
+displacement = ["free", "free", "15 mm"]
 [[load]]
 name = "aside"
 where = "zmax"
