@@ -176,7 +176,7 @@ EquilibriumResult Run::solve(Mechanics& mechanics) {
     CoarseStart start;
     if (body_.cell_count() >= kLeastCellsToCoarsen)
       start = [&](Progress& stretch) { return coarse_equilibrium(stretch); };
-    return find_equilibrium(mechanics, state_, scene_.run, progress_, start);
+    return find_equilibrium(mechanics, state_, scene_.run, progress_, start, options_.hooks.get());
   } catch (const OverloadError& error) {
     throw OverloadError(error.what() + save_failed(mechanics));
   } catch (const DivergedError& error) {
@@ -198,6 +198,7 @@ std::optional<NearStart> Run::coarse_equilibrium(Progress& stretch) {
     SimulateOptions options = options_;
     options.stress = options.explain = false;
     options.failed_output.clear();
+    options.hooks = hooks_on_coarser(options_.hooks);
     Run run(coarse.body, same, options, stretch);
     const SimulateResult found = run();
     start_newton_iterations_ = std::max(found.newton_iterations, found.start_newton_iterations);

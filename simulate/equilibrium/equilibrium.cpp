@@ -106,20 +106,35 @@ void restore_links(const Constraints& constraints, const std::vector<RigidLink>&
     if (motion.link) *motion.link = *link++;
 }
 
+// m: how far linear answers reach.
+struct LinearReach {
+  double farthest = std::numeric_limits<double>::infinity();  // of an attempt
+  double hopeless = std::numeric_limits<double>::infinity();  // likewise, for the whole load
+  double first = 0;                                           // the first one, for the whole load
+};
+
 // A run over load steps.
 class LoadStepping {
  public:
   LoadStepping(Mechanics& mechanics, State& state, const RunSettings& settings, Progress& progress,
-               const CoarseStart& start)
+               const CoarseStart& start, const LoadStepHooks* hooks)
       : mechanics_(mechanics),
         state_(state),
         settings_(settings),
         progress_(progress),
         start_(start),
+        hooks_(hooks),
         beginning_{state.displacement, follower_memory(mechanics), links_now(mechanics.constraints())},
         first_(1.0 / std::max(settings.load_steps, least_load_steps(mechanics))),
         length_(first_),
-        unilateral_(mechanics.unilateral()) {}
+        unilateral_(mechanics.unilateral()) {
+    if (hooks && hooks->make_solver) solver_ = hooks->make_solver(mechanics);
+    if (!hooks || !hooks->begin) return;
+    done_ = hooks->begin->share;
+    reach_.first = hooks->begin->reach;
+    state_.displacement = hooks->begin->displacement;
+    state_.share = done_;
+  }
 
   EquilibriumResult operator()();
 
@@ -139,8 +154,8 @@ class LoadStepping {
   bool branch_off();
   void push(State& state) const;
   [[nodiscard]] bool overloaded() const {
-    return reach_ > (mechanics_.follows() ? kOutOfProportion : kOverload) *
-                        bounding_box(mechanics_.body().rest).diagonal();
+    return reach_.first > (mechanics_.follows() ? kOutOfProportion : kOverload) *
+                              bounding_box(mechanics_.body().rest).diagonal();
   }
   // After an attempt: begins again with free strain in the next mode, where its time has come.
   bool change_free_strain();
@@ -161,6 +176,8 @@ class LoadStepping {
   const RunSettings& settings_;
   Progress& progress_;
   const CoarseStart& start_;
+  const LoadStepHooks* hooks_;  // may be null
+  LoadStepSolver solver_;       // empty: newton_with_links()
   const RunBeginning beginning_;
   double first_;  // share of the load: the first step; none is longer
   LoadStepLength length_;
@@ -169,9 +186,7 @@ class LoadStepping {
   EquilibriumResult result_;
   State trial_;  // of the last attempt
   NewtonOutcome outcome_;
-  double farthest_reach_ = std::numeric_limits<double>::infinity();  // m, of an attempt's linear answer
-  double hopeless_reach_ = std::numeric_limits<double>::infinity();  // m, likewise, for the whole load
-  double reach_ = 0;               // m: of the first linear answer, for the whole load
+  LinearReach reach_;
   std::optional<NearStart> near_;  // where the next attempt starts in place of `state_`
   int spent_ = 0;  // iterations from there, or in earlier modes of free strain, that came to nothing
   FreeStrainMode free_strain_ = FreeStrainMode::whole;
@@ -216,8 +231,8 @@ void LoadStepping::refuse_load() const {
       "of "
       "the part (--unit), the load, and the stiffness of {}; in a scene, [run] load_steps = 10 tries it all "
       "the same",
-      force > 0 ? fmt::format(" ({} in all)", human_force(force)) : "", human_length(reach_),
-      human_count(static_cast<std::size_t>(std::min(reach_ / diagonal, 1e15))), human_length(diagonal),
+      force > 0 ? fmt::format(" ({} in all)", human_force(force)) : "", human_length(reach_.first),
+      human_count(static_cast<std::size_t>(std::min(reach_.first / diagonal, 1e15))), human_length(diagonal),
       fmt::join(materials, ", ")));
 }
 
@@ -227,23 +242,25 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   options.steps = steps;
   options.tolerance = settings_.tolerance;
   options.max_iterations = std::min(max_iterations, iterations_left());
-  options.farthest_reach = std::min(farthest_reach_, hopeless_reach_ * next);
+  options.farthest_reach = std::min(reach_.farthest, reach_.hopeless * next);
   trial_ = state_;
   if (near_) trial_.displacement = near_->displacement;
   trial_.share = next;
   if (pushed_) push(trial_);
   std::optional<ShareScope> preparing;
-  if (reach_ == 0) preparing.emplace(progress_, kBeforeSearch, kBeforeFirstStep, "preparing");
+  if (reach_.first == 0) preparing.emplace(progress_, kBeforeSearch, kBeforeFirstStep, "preparing");
   const std::vector<RigidLink> links = links_now(mechanics_.constraints());
   double most_gone = 0;  // a residual may rise again
-  outcome_ = newton_with_links(mechanics_, trial_, options, [&](double gone, const std::string& note) {
+  const NewtonProgress tell = [&](double gone, const std::string& note) {
     check_stop();
     preparing.reset();
     most_gone = std::max(most_gone, gone);
     progress_.update(begun_ + (1 - begun_) * (done_ + most_gone * (trial_.share - done_)),
                      fmt::format("load {:.3g} %, {}", 100 * trial_.share, note));
-  });
-  if (reach_ == 0) reach_ = outcome_.first_reach / trial_.share;  // from rest: a near start moves by less
+  };
+  outcome_ = solver_ ? solver_(trial_, options, tell) : newton_with_links(mechanics_, trial_, options, tell);
+  if (reach_.first == 0)
+    reach_.first = outcome_.first_reach / trial_.share;  // from rest: a near start moves by less
   result_.newton_iterations += outcome_.iterations;
   result_.cg_iterations += outcome_.cg_iterations;
   result_.linear_seconds += outcome_.linear_seconds;
@@ -256,6 +273,7 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   for (const ActiveEffect& effect : mechanics_.effects()) effect->accept(state_);
   ++result_.load_steps;
   result_.relative_residual = outcome_.relative_residual;
+  if (hooks_ && hooks_->done) hooks_->done({done_, reach_.first, state_.displacement});
   length_.succeeded(outcome_.iterations <= kEasyIterations);
   return true;
 }
@@ -305,7 +323,7 @@ void LoadStepping::diverge() const {
           ? fmt::format(
                 "At its first stiffness the load would move the part by {}, {} times its size: "
                 "check the unit of the part and the load",
-                human_length(reach_), human_number(reach_ / diagonal, 2))
+                human_length(reach_.first), human_number(reach_.first / diagonal, 2))
           : "Use a smaller load or move, a smaller spacing or a stiffer material; a part that buckles or "
             "snaps through has no equilibrium nearby";
   std::string chains = said_of_chains(mechanics_.cells().drawn_chains(state_), body);
@@ -355,8 +373,8 @@ bool LoadStepping::branch_off() {
 }
 
 bool LoadStepping::begin_near() {
-  const bool far = outcome_.first_reach > farthest_reach_;
-  farthest_reach_ = std::numeric_limits<double>::infinity();
+  const bool far = outcome_.first_reach > reach_.farthest;
+  reach_.farthest = std::numeric_limits<double>::infinity();
   if (!far) return false;
   if (!overloaded()) {
     ProgressStretch stretch(progress_, kBeforeFirstStep, kStarted);
@@ -405,7 +423,7 @@ EquilibriumResult LoadStepping::operator()() {
     throw TimeoutError(fmt::format("{} in equilibrium with {:.4g} % of the load, {} Newton iterations",
                                    error.what(), 100 * done_, result_.newton_iterations));
   }
-  result_.linear_reach = mechanics_.has_free_strain() ? reach_beside_free_strain() : reach_;
+  result_.linear_reach = mechanics_.has_free_strain() ? reach_beside_free_strain() : reach_.first;
   return result_;
 }
 
@@ -413,7 +431,7 @@ double LoadStepping::reach_beside_free_strain() {
   const std::vector<ActiveEffect>& effects = mechanics_.effects();
   const auto drives = [](const ActiveEffect& effect) { return effect->drives(); };
   const auto moved = [](const Vec3& u) { return !u.isZero(0); };
-  if (std::none_of(effects.begin(), effects.end(), drives) || indented_ || result_.buckled ||
+  if (std::none_of(effects.begin(), effects.end(), drives) || unilateral_ || result_.buckled ||
       std::any_of(beginning_.displacement.begin(), beginning_.displacement.end(), moved))
     return 0;
   const auto quiet = [](double, const std::string&) { check_stop(); };
@@ -444,13 +462,13 @@ void LoadStepping::solve() {
   const bool linked = std::any_of(motions.begin(), motions.end(),
                                   [](const Motion& motion) { return motion.link != nullptr; });
   if (start_ && first_ == 1 && !linked)
-    farthest_reach_ = kFarReach * bounding_box(mechanics_.body().rest).diagonal();
-  hopeless_reach_ = out_of_proportion();
+    reach_.farthest = kFarReach * bounding_box(mechanics_.body().rest).diagonal();
+  reach_.hopeless = out_of_proportion();
   while (done_ < 1) {
     refused_ = false;
     if (!lowers_ && attempt(NewtonSteps::full, kFullStepIterations)) continue;
-    if (reach_ > hopeless_reach_) refuse_load();
-    hopeless_reach_ = std::numeric_limits<double>::infinity();  // the first answer alone counts
+    if (reach_.first > reach_.hopeless) refuse_load();
+    reach_.hopeless = std::numeric_limits<double>::infinity();  // the first answer alone counts
     if (begin_near() || change_free_strain()) continue;
     if (iterations_left() > 0 && !refused_ && (unilateral_ || length_.get() <= kLoweringIncrement * first_) &&
         !mechanics_.follows() && attempt(NewtonSteps::lowering, NewtonOptions().max_iterations)) {
@@ -468,6 +486,11 @@ void LoadStepping::solve() {
 }
 
 }  // namespace
+
+std::shared_ptr<const LoadStepHooks> hooks_on_coarser(const std::shared_ptr<const LoadStepHooks>& hooks) {
+  if (!hooks) return nullptr;
+  return std::make_shared<const LoadStepHooks>(LoadStepHooks{hooks->make_solver, {}, {}});
+}
 
 FollowerMemory follower_memory(const Mechanics& mechanics) {
   FollowerMemory memory;
@@ -527,8 +550,8 @@ void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const
 }
 
 EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state, const RunSettings& settings,
-                                   Progress& progress, const CoarseStart& start) {
-  return LoadStepping(mechanics, state, settings, progress, start)();
+                                   Progress& progress, const CoarseStart& start, const LoadStepHooks* hooks) {
+  return LoadStepping(mechanics, state, settings, progress, start, hooks)();
 }
 
 }  // namespace flexel::simulate

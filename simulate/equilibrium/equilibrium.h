@@ -5,6 +5,7 @@
 
 #include "base/program/progress.h"
 #include "simulate/equilibrium/mechanics.h"
+#include "simulate/equilibrium/newton.h"
 #include "simulate/scene/scene.h"
 
 namespace flexel::simulate {
@@ -49,8 +50,31 @@ void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const
 // reaches so far that the way there is long; it may be empty, or give nothing. Its Progress is a stretch of
 // this run's.
 using CoarseStart = std::function<std::optional<NearStart>(Progress&)>;
+
+// What solves one load step in place of newton(), with the same arguments but for the Mechanics that it was made for.
+using LoadStepSolver = std::function<NewtonOutcome(State&, const NewtonOptions&, const NewtonProgress&)>;
+
+// An equilibrium on the way to the whole load.
+struct LoadStepDone {
+  double share = 0;                // of the load
+  double reach = 0;                // m, of the first linear answer, for the whole load
+  std::vector<Vec3> displacement;  // m (elements)
+};
+
+// `make_solver` is asked once for each search for an equilibrium, those on coarser lattices too. `done` hears of each
+// load step that ended in equilibrium, but of none on a coarser lattice. `begin`: the load steps go on from there.
+struct LoadStepHooks {
+  std::function<LoadStepSolver(Mechanics&)> make_solver;
+  std::function<void(const LoadStepDone&)> done;
+  std::optional<LoadStepDone> begin;
+};
+// For a search on a coarser lattice; null where `hooks` is.
+[[nodiscard]] std::shared_ptr<const LoadStepHooks> hooks_on_coarser(
+    const std::shared_ptr<const LoadStepHooks>& hooks);
+
 [[nodiscard]] EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state,
                                                  const RunSettings& settings, Progress& progress,
-                                                 const CoarseStart& start = {});
+                                                 const CoarseStart& start = {},
+                                                 const LoadStepHooks* hooks = nullptr);
 
 }  // namespace flexel::simulate

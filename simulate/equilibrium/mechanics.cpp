@@ -9,6 +9,7 @@
 
 #include "base/math/eigenvalues.h"
 #include "base/parallel.h"
+#include "simulate/equilibrium/effect_matrix.h"
 #include "simulate/thermal/free_strain.h"
 
 namespace flexel::simulate {
@@ -142,6 +143,18 @@ Forces Mechanics::forces(const State& state) {
   if (!std::isfinite(result.scale)) result.scale = std::numeric_limits<double>::quiet_NaN();
   parallel_for_each(inner.size(), [&](std::size_t e) { result.total[e] += inner[e]; });
   return result;
+}
+
+std::vector<Vec3> Mechanics::forces_of_effects(const State& state) const {
+  std::vector<Vec3> forces(body_.element_count(), Vec3::Zero());
+  for (const ActiveEffect& effect : effects_) effect->add_forces(state, forces);
+  return forces;
+}
+
+BlockMatrix Mechanics::stiffness_of_effects(const State& state) const {
+  BlockMatrix matrix = matrix_of_effects(body_, pattern_.matrix, effects_);
+  for (const ActiveEffect& effect : effects_) effect->add_stiffness(state, matrix);
+  return matrix;
 }
 
 void Mechanics::assemble(const State& state, const TangentOptions& tangent) {

@@ -69,6 +69,10 @@ class Mechanics {
   void add_elastic_forces(const State& state, std::vector<Vec3>& forces);
   [[nodiscard]] MostCompressed most_compressed(const State& state) const;
   [[nodiscard]] Forces forces(const State& state);
+  // What effects alone do: their forces [N] (elements), and their stiffness [N/m], which must couple only elements of
+  // one cell.
+  [[nodiscard]] std::vector<Vec3> forces_of_effects(const State& state) const;
+  [[nodiscard]] BlockMatrix stiffness_of_effects(const State& state) const;
   // Tangent stiffness into tangent(), prescribed components not yet eliminated.
   void assemble(const State& state, const TangentOptions& tangent = {});
   void eliminate_prescribed();

@@ -15,6 +15,7 @@
 #include "base/stop.h"
 #include "formats/lattice/fields.h"
 #include "formats/lattice/quadratic_field.h"
+#include "simulate/equilibrium/equilibrium.h"
 #include "simulate/estimate/coarsen.h"
 #include "simulate/estimate/narrow_region.h"
 
@@ -88,6 +89,7 @@ class CoarseRuns {
     options_.explain = options_.estimate = false;
     options_.failed_output.clear();
     options_.cut_box = {};
+    options_.hooks = hooks_on_coarser(options_.hooks);
   }
 
   // Adds one lattice; false, with the reason, where it cannot be done. A lattice whose cells are wider than

@@ -11,8 +11,9 @@ struct Body;  // formats/lattice/body.h
 
 namespace flexel::simulate {
 
-struct LatticeBox;  // simulate/matter/voxel_pieces.h
-struct Checkpoint;  // simulate/time/checkpoint.h
+struct LatticeBox;     // simulate/matter/voxel_pieces.h
+struct Checkpoint;     // simulate/time/checkpoint.h
+struct LoadStepHooks;  // simulate/equilibrium/equilibrium.h
 
 // The matter of the run's part in a box of a lattice, with the part's whole surface and exact moments (voxelize/voxelize_box.h). Throws
 // InputError.
@@ -45,6 +46,8 @@ struct SimulateOptions {
   std::function<void(const Body& body, double time)> on_frame = {};
   // Model `quadratic`: what the largest stress is looked at closer with (docs/theory/local-stress.md); null: it is not.
   CutBox cut_box = {};
+  // Equilibrium without contact: who solves in place of newton(), and who hears of load steps; null: nobody.
+  std::shared_ptr<const LoadStepHooks> hooks = {};
 };
 
 }  // namespace flexel::simulate

@@ -4,7 +4,7 @@ import os
 import re
 import sys
 
-from harness import BIN, SOURCE, binary_stl, box_triangles, expect, expect_ok, main, need, need_step, run, write
+from harness import BIN, SOURCE, Skip, binary_stl, box_triangles, expect, expect_ok, main, need, need_step, run, write
 
 sys.path.insert(0, str(SOURCE / "tests/interop"))
 PIPELINES = SOURCE / "samples/pipelines"
@@ -88,6 +88,16 @@ def test_lammps():
     held, swung = (abs(new[abs(new[:, 0] - end) < 0.5][:, 2].min() - old[:, 2].min()) for end in (old[:, 0].min(), new[:, 0].max()))
     expect(held < 1e-3 and 0.1 < swung < 10, f"the held end moved by {held} mm, the free one by {swung} mm")
     expect(os.path.exists("out/swing_00010.vtu") and not os.path.exists("out/swing_00011.vtu"), "eleven frames are wanted")
+
+
+def test_mpi():
+    if not (BIN / "flexel-simulate-mpi").exists():
+        raise Skip("built without PETSc and MPI (tools/setup --mpi)")
+    need("mpirun")
+    os.environ.update(OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1", OMPI_MCA_mpi_yield_when_idle="1")
+    write("bar.stl", binary_stl(box_triangles((40.0, 8.0, 6.0))))
+    pipeline("mpi.sh", "bar.stl", "out", "2")
+    bent("bar.stl", "out/bent.stl")
 
 
 def test_failure_stops_the_pipeline():

@@ -4,7 +4,7 @@ import re
 
 from harness import SOURCE, expect, main
 
-FOLDERS = ("base", "formats", "voxelize", "simulate", "mapping", "cad", "flexel")
+FOLDERS = ("base", "formats", "voxelize", "simulate", "distributed", "mapping", "cad", "flexel")
 
 
 def literals():

@@ -9,7 +9,7 @@ import sys
 
 from harness import BIN, SOURCE, Skip, expect, main, need
 
-CODE = ["base", "formats", "meshes", "voxelize", "simulate", "mapping", "cad", "flexel", "python"]
+CODE = ["base", "formats", "meshes", "voxelize", "simulate", "distributed", "mapping", "cad", "flexel", "python"]
 
 # Every folder of the code, each after those that it may include: docs/development.md says what they hold.
 ORDER = """
@@ -21,6 +21,7 @@ voxelize/types voxelize/mesh voxelize/distances voxelize/classify voxelize/heal 
 simulate/laws simulate/input simulate/result simulate/linear simulate/state simulate/rigid simulate/conditions simulate/models
 simulate/kernels simulate/matter simulate/gravitation simulate/contact/points simulate/contact/pairs simulate/contact simulate/followers simulate/effects simulate/thermal simulate/paper simulate/joints simulate/indent simulate/events simulate/scene
 simulate/equilibrium simulate/estimate simulate/probes simulate/quadratic/cells simulate/quadratic simulate/conduction simulate/live simulate/stepping simulate/implicit simulate/time simulate/modes simulate
+distributed
 mapping/types mapping/anchors mapping/checks mapping/methods mapping/space mapping/crack mapping/report mapping/refine mapping
 cad/read cad/fit cad/deform cad
 flexel/process flexel/picture/canvas flexel/picture/render flexel/picture flexel/view flexel/clay flexel/study/runs flexel/study flexel/export flexel/lammps

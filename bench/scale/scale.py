@@ -1,0 +1,205 @@
+#!/usr/bin/env python3
+"""Writes docs/measurements/scale.md to stdout: flexel-simulate-mpi on several ranks, its time, memory and messages.
+
+    PATH=build/release/bin:$PATH bench/scale/scale.py [--large] >docs/measurements/scale.md
+
+The case is a bar of steel, 4:1:1, held at one end with a small load across the other. --large adds a million cells. Wall seconds mean something on
+a quiet machine only; iterations, bytes and memory mean the same on any.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import platform
+import re
+import subprocess
+import sys
+import tempfile
+import time
+
+ENVIRONMENT = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1", OMPI_MCA_rmaps_base_oversubscribe="1",
+                   OMPI_MCA_hwloc_base_binding_policy="none")
+SCENE = ('material = "steel"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = ["0 N", "0 N", "-100 N"]\n'
+         '[[probe]]\nname = "end"\nwhere = "xmax"\n')
+
+
+def box(path, sides):
+    """A box as OBJ, lengths in mm."""
+    x, y, z = sides
+    corners = [(a, b, c) for c in (0, z) for b in (0, y) for a in (0, x)]
+    quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    path.write_text("".join(f"v {a} {b} {c}\n" for a, b, c in corners) + "".join("f " + " ".join(str(i + 1) for i in quad) + "\n" for quad in quads))
+
+
+def bar(folder, sides):
+    """A bar of so many cells along x, y and z."""
+    body = folder / f"bar-{sides[0]}-{sides[1]}.vtu"
+    if not body.exists():
+        box(folder / "bar.obj", sides)
+        subprocess.run(["flexel-voxelize", folder / "bar.obj", "--size", "1 mm", "--quiet", "-o", body], check=True, stderr=subprocess.DEVNULL)
+    (folder / "scene.toml").write_text(SCENE)
+    return body
+
+
+def run(command):
+    """Wall and processor seconds, and what it said."""
+    began, usage = time.monotonic(), os.times()
+    done = subprocess.run([str(each) for each in command], env=ENVIRONMENT, capture_output=True, text=True, check=False)
+    if done.returncode:
+        sys.exit(f"scale.py: {' '.join(map(str, command))} ended with {done.returncode}:\n{done.stderr}")
+    now = os.times()
+    return time.monotonic() - began, now.children_user + now.children_system - usage.children_user - usage.children_system, done.stderr
+
+
+def bytes_of(text):
+    number, unit = text.split()
+    return float(number.replace(",", "")) * {"B": 1, "kB": 1e3, "KB": 1e3, "MB": 1e6, "GB": 1e9}[unit]
+
+
+def solve(folder, body, ranks):
+    """One run of flexel-simulate-mpi (ranks 0: of flexel-simulate): its summary and figures."""
+    out, log = folder / "out.vtu", folder / "log.txt"
+    program = ["mpirun", "-n", ranks, "flexel-simulate-mpi", "--petsc", f"-log_view :{log}"] if ranks else ["flexel-simulate", "--threads", 1]
+    wall, processor, said = run([*program, folder / "scene.toml", body, "--no-estimate", "--no-stress", "--explain", "--summary", folder / "s.json",
+                                 "-o", out])
+    found = json.loads((folder / "s.json").read_text())
+    linear = re.search(r"linear solver\D*([\d.]+) s", said)
+    found.update(wall=wall, processor=processor, linear=float(linear[1]) if linear else float("nan"), ranks=ranks,
+                 memory=[bytes_of(each) for each in re.findall(r"rank \d+: [\d,]+ cells, ([\d.,]+ \w+) at most", said)])
+    found["tip"] = sum(x * x for x in found["probes"][0]["displacement"]) ** 0.5
+    if ranks:
+        found["events"] = events(log.read_text())
+    return found
+
+
+def events(log):
+    """PETSc's -log_view: {event: (calls, messages, bytes of one on average, reductions)}, over all ranks."""
+    found = {}
+    for line in log.splitlines():
+        words = re.split(r"\s+", line.strip())
+        if len(words) > 10 and re.fullmatch(r"[A-Z]\w+", words[0]) and words[1].isdigit():
+            try:
+                found[words[0]] = (int(words[1]), float(words[7]), float(words[8]), float(words[9]))
+            except ValueError:
+                continue
+    return found
+
+
+def row(*cells):
+    print("| " + " | ".join(str(each) for each in cells) + " |", flush=True)
+
+
+def head(*cells):
+    row(*cells)
+    row(*["---"] * len(cells))
+
+
+def processor_name():
+    for line in pathlib.Path("/proc/cpuinfo").read_text().splitlines():
+        if line.startswith("model name"):
+            return line.split(":")[1].strip()
+    return platform.machine()
+
+
+def gamg_table(folder, sizes):
+    print("\n## GAMG beside Flexel's own hierarchy\n\nOne process, one thread each. Flexel's hierarchy is that of `flexel-simulate` "
+          "([theory/solver.md](../theory/solver.md)), which is not offered to PETSc. Linear seconds: preconditioner and conjugate gradients; with PETSc also "
+          "assembly, forces and energies.\n")
+    head("cells", "unknowns", "CG with GAMG", "CG with Flexel's", "linear s with GAMG", "linear s with Flexel's", "largest difference of the end, relative")
+    for sides in sizes:
+        body = bar(folder, sides)
+        petsc, own = solve(folder, body, 1), solve(folder, body, 0)
+        row(f"{petsc['cells']:,}", f"{petsc['unknowns']:,}", petsc["cg_iterations"], own["cg_iterations"], f"{petsc['linear']:.1f}", f"{own['linear']:.1f}",
+            f"{abs(petsc['tip'] - own['tip']) / own['tip']:.0e}")
+
+
+def memory_words(found):
+    return f"{found['memory'][0] / 1e6:,.0f}", f"{max(found['memory'][1:], default=0) / 1e6:,.0f}" if found["ranks"] > 1 else "-"
+
+
+def scaling_table(folder, title, words, cases):
+    print(f"\n## {title}\n\n{words}\n")
+    head("cells", "ranks", "CG", "wall s", "linear s", "processor s", "MB of rank 0", "MB of the largest other")
+    results = []
+    for sides, ranks in cases:
+        found = solve(folder, bar(folder, sides), ranks)
+        results.append((sides, found))
+        row(f"{found['cells']:,}", ranks, found["cg_iterations"], f"{found['wall']:.1f}", f"{found['linear']:.1f}", f"{found['processor']:.1f}", *memory_words(found))
+    return results
+
+
+def message_table(results):
+    print("\n## What ranks exchange\n\nBy PETSc's `-log_view`, between all ranks together. A product sends the displacements of the elements of a slab's end faces: "
+          "24 bytes for each of theirs, each way, so (cells across)² x 24 bytes a face and direction, whatever the slab's length. `computed` is that.\n")
+    head("cells", "ranks", "cells a rank", "products", "bytes a product, all levels of GAMG", "computed, finest level alone", "messages a product", "reductions a CG iteration")
+    for sides, found in results:
+        ranks, ev = found["ranks"], found["events"]
+        if ranks == 1 or "MatMult" not in ev:
+            continue
+        calls, messages, length, _ = ev["MatMult"]
+        reductions = sum(ev[name][3] for name in ("VecNorm", "VecTDot", "VecDot") if name in ev)
+        faces = 2 * (ranks - 1)
+        row(f"{found['cells']:,}", ranks, f"{found['cells'] // ranks:,}", f"{calls:,}", f"{messages * length / calls:,.0f}",
+            f"{24 * (sides[1] + 1) * (sides[2] + 1) * faces:,}", f"{messages / calls:.1f}", f"{reductions / max(1, found['cg_iterations']):.1f}")
+    print("\nAssembly of a tangent sends the rows of those faces once (27 blocks of 72 bytes an element), a residual their forces, 24 bytes an element. Rank 0 hands "
+          "out and takes back all displacements once a load step, 24 bytes an element, and sends each rank its piece once a run.")
+
+
+def memory_fit(results):
+    """Bytes a cell: of rank 0's own share (whole body), and of a rank's piece; by least squares over runs with two ranks or more."""
+    rows = [(found["cells"], found["cells"] / found["ranks"], found["memory"]) for _, found in results if found["ranks"] > 1]
+    biggest, smallest = max(rows, key=lambda each: each[1]), min(rows, key=lambda each: each[1])
+    piece = (max(biggest[2][1:]) - max(smallest[2][1:])) / (biggest[1] - smallest[1])
+    base = max(smallest[2][1:]) - piece * smallest[1]
+    whole = max(biggest[2][0] - base - piece * biggest[1], 0) / biggest[0]
+    return piece, whole, base
+
+
+def billion(results):
+    piece, whole, base = memory_fit(results)
+    cells, ranks = 1e9, 1000
+    each = cells / ranks
+    side = (cells / 4) ** (1 / 3)
+    iterations = max(found["cg_iterations"] for _, found in results)
+    best = min((found["linear"] / found["cg_iterations"] / (found["cells"] / found["ranks"]), found) for _, found in results if found["ranks"] == 1)
+    face = 24 * side * side
+    print(f"""
+## A billion cells on 1,000 ranks, from these
+
+| figure | value | from |
+|---|---|---|
+| cells a rank | {each:,.0f} | 1e9 / 1,000 |
+| memory a rank, its piece | {(base + piece * each) / 1e9:.1f} GB | {base / 1e6:,.0f} MB and {piece:,.0f} bytes a cell: the difference of the largest and the smallest rank above |
+| memory of rank 0 besides | {whole * cells / 1e9:,.0f} GB | {whole:,.0f} bytes a cell of the whole body, rank 0 above less its piece |
+| bytes a product and rank, finest level | {2 * face / 1e6:.1f} MB | two faces of {side:,.0f} x {side:,.0f} elements, 24 bytes each |
+| bytes a tangent and rank | {2 * 27 * 72 * side * side / 1e9:.2f} GB | 27 blocks of 72 bytes an element of those faces |
+| solver's processor seconds a rank | {best[0] * each * iterations:,.0f} s | {best[0] * 1e6:.2f} us a cell and CG iteration on one rank above, {iterations} iterations, were they as many |
+
+So rank 0 is what stops it: it holds the whole body, and a machine of 1 TB ends near {1e12 / max(whole, 1) / 1e9:.1f} billion cells of slabs. Slabs of a bar 4:1:1 cut in 1,000 are {4 * side / 1000:.1f} cells
+thick, with as many elements on their faces as within; and PETSc as Debian builds it counts unknowns in 32 bits, which end at 2.1e9 (3e9 are needed):
+`libpetsc64-real-dev` has 64.""")
+
+
+def main():
+    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    arguments.add_argument("--large", action="store_true", help="a million cells too")
+    options = arguments.parse_args()
+    with tempfile.TemporaryDirectory() as place:
+        folder = pathlib.Path(place)
+        print(f"""# Many processes
+
+Printed by `bench/scale/scale.py{' --large' if options.large else ''}` on {os.cpu_count()} cores ({processor_name()}), load average {os.getloadavg()[0]:.1f} when it began. A bar of steel, 4:1:1, held at one end, with a small
+load across the other; `flexel-simulate-mpi` without error bars and stresses. Wall and linear seconds are those of a machine with that load; more ranks than cores
+share them.""")
+        gamg_table(folder, [(56, 14, 14), (120, 30, 30)] + ([(252, 63, 63)] if options.large else []))
+        results = scaling_table(folder, "Strong scaling", "The same body on more ranks.", [((120, 30, 30), ranks) for ranks in (1, 2, 4)])
+        results += scaling_table(folder, "Weak scaling", "As many cells for each rank: the bar grows along its length.",
+                                 [((60 * ranks, 30, 30), ranks) for ranks in (1, 2, 4)])
+        message_table(results)
+        billion(results)
+        print("\n## The yardstick\n\nPETSc's own ex56 (elasticity on 8-node cells with GAMG) is not in Debian's packages, which have no sources of its examples: it was not run.")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,184 @@
+// flexel-simulate-mpi: body + scene -> deformed body, on all ranks of an mpirun.
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdio>
+
+#include "base/error.h"
+#include "base/files/files.h"
+#include "base/files/outputs.h"
+#include "base/parallel.h"
+#include "base/program/arguments.h"
+#include "base/program/brief_output.h"
+#include "base/program/program.h"
+#include "base/program/termination.h"
+#include "base/units.h"
+#include "distributed/checkpoint.h"
+#include "distributed/petsc.h"
+#include "distributed/refusals.h"
+#include "distributed/team.h"
+#include "formats/lattice/body_file.h"
+#include "simulate/answer.h"
+#include "simulate/matter/stress.h"
+#include "simulate/scene/strength.h"
+#include "simulate/simulate.h"
+#include "simulate/summary.h"
+
+namespace {
+
+using namespace flexel;
+using namespace flexel::simulate;
+
+constexpr const char* kProgram = "flexel-simulate-mpi";
+
+struct Arguments {
+  std::string scene, body, output, summary, petsc, resume;
+  SimulateOptions options;
+  bool quiet = false, verbose = false, compress = false, force = false, json = false;
+};
+
+void declare(CommandLine& app, Arguments& arguments) {
+  arguments.options.threads = 1;
+  app.add_option("scene", arguments.scene, "Scene file (TOML; docs/reference/scene.md gives every key)");
+  app.add_option("body", arguments.body, "Body file; rank 0 reads it and cuts it into a piece for each rank");
+  app.add_option("-o,--output", arguments.output, "Deformed body (.vtu)");
+  app.add_option("--petsc", arguments.petsc, "Options of PETSc's, for example \"-ksp_view\"");
+  app.add_option("--checkpoint", arguments.options.checkpoint,
+                 "Write every load step that ends in equilibrium to this file, in place of the one before");
+  app.add_option("--resume", arguments.resume,
+                 "Go on from the load step in this file, of the same scene and body");
+  add_threads_option(app, arguments.options.threads);
+  app.add_option("--summary", arguments.summary,
+                 "Write the summary as JSON to this file (docs/reference/summary.md)");
+  app.add_flag("--json", arguments.json, "Print it to stdout");
+  app.add_flag("--explain", arguments.options.explain,
+               "Say which effects run and why, and the share of time of each");
+  app.add_flag("!--no-stress", arguments.options.stress, "Leave out the stresses (docs/theory/stress.md)");
+  app.add_flag(
+      "!--no-estimate", arguments.options.estimate,
+      "Leave out the error bars, and the two coarser runs that they come from (docs/theory/error-bars.md)");
+  app.add_flag("--quiet", arguments.quiet, "Say nothing but warnings and errors");
+  app.add_flag("--verbose", arguments.verbose, "Say all that was found");
+  app.add_flag("--compress", arguments.compress, "Compress the arrays of the body file");
+  app.add_flag("--force", arguments.force, "Let results replace files that are read");
+}
+
+void check_files(const Arguments& arguments) {
+  if (arguments.scene.empty() || arguments.body.empty())
+    throw InputError(
+        "a scene and a body are needed, for example mpirun -n 4 flexel-simulate-mpi scene.toml "
+        "body.vtu -o out.vtu; --help shows what is accepted");
+  if (arguments.output.empty()) throw InputError("-o is needed, for example -o out.vtu");
+  for (const std::string& name : {arguments.scene, arguments.body, arguments.output})
+    if (name == "-") throw InputError("\"-\": ranks have no stdin and stdout of their own; give files");
+  check_outputs({{arguments.output, true},
+                 {arguments.summary},
+                 {arguments.json ? "-" : ""},
+                 {arguments.options.failed_output}},
+                {arguments.scene, arguments.body, arguments.resume}, arguments.force);
+  check_outputs({{arguments.options.checkpoint}, {arguments.output}, {arguments.summary}},
+                {arguments.scene, arguments.body}, arguments.force);
+}
+
+std::string failed_name(const std::string& output) {
+  return (extension(output) == "vtu" ? output.substr(0, output.size() - 4) : output) + ".failed.vtu";
+}
+
+LoadStepHooks hooks_of(const Arguments& arguments, const Scene& scene, const Body& body,
+                       distributed::Leader& leader) {
+  LoadStepHooks hooks;
+  hooks.make_solver = [&](Mechanics& mechanics) { return leader.make_solver(mechanics); };
+  std::string path = arguments.options.checkpoint;
+  const auto file = std::make_shared<distributed::LoadStepFile>(scene, body);
+  if (!arguments.resume.empty()) {
+    hooks.begin = file->read(arguments.resume);
+    if (path.empty()) path = arguments.resume;
+  }
+  if (!path.empty()) hooks.done = [file, path](const LoadStepDone& done) { file->write(done, path); };
+  return hooks;
+}
+
+void explain_ranks(const distributed::Leader& leader, Progress& progress) {
+  const std::vector<distributed::RankUse> uses = leader.uses();
+  for (std::size_t r = 0; r < uses.size(); ++r)
+    progress.say(fmt::format("rank {}: {} cells, {} at most", r,
+                             human_count(static_cast<std::size_t>(uses[r].cells)),
+                             human_bytes(uses[r].memory)));
+}
+
+// What rank 0 does.
+void lead(Arguments& arguments, distributed::Leader& leader) {
+  SimulateOptions& options = arguments.options;
+  Progress progress(kProgram, arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
+  const KeptWarnings warnings;  // for the summary
+  progress.stage("read");
+  options.failed_output = arguments.output.empty() ? "" : failed_name(arguments.output);
+  check_files(arguments);
+  const Scene scene = read_scene(arguments.scene);
+  distributed::refuse_unsupported(scene);
+  Body body = read_body(arguments.body);
+  erase_stress_columns(body);
+  distributed::refuse_unsupported(scene, body);
+  OutputsTogether outputs({arguments.output, arguments.summary});
+  leader.give(scene);
+  options.hooks = std::make_shared<const LoadStepHooks>(hooks_of(arguments, scene, body, leader));
+  options.checkpoint.clear();  // that of timed runs
+  const SimulateResult result = simulate::simulate(body, scene, options, progress);
+  options.hooks.reset();
+  const std::vector<Material> materials = known_materials(scene, body);
+  const auto summary = [&] { return summary_json(result, body, materials, warnings.lines()); };
+  if (const std::string unused = distributed::Session::unused_options(); !unused.empty())
+    progress.warn(fmt::format("--petsc: nothing asked for {}", unused));
+  if (arguments.verbose || options.explain)
+    for (const std::string& line : summary_lines(result)) progress.say(line);
+  if (options.explain) explain_ranks(leader, progress);
+  progress.stage("write");
+  BodyFileOptions file_options;
+  file_options.compress = arguments.compress;
+  write_body(body, arguments.output, file_options);
+  if (!arguments.summary.empty()) write_text(summary(), arguments.summary);
+  outputs.appear();
+  progress.finish();
+  for (const std::string& line : answer_lines(result, body, materials)) progress.say(line);
+  if (arguments.json) write_text(summary(), "-");
+}
+
+// The others say nothing.
+void close_stdout() {
+  const int nowhere = ::open("/dev/null", O_WRONLY);
+  if (nowhere < 0) return;
+  std::fflush(stdout);
+  ::dup2(nowhere, STDOUT_FILENO);
+  ::close(nowhere);
+}
+
+int run(int argc, char** argv, distributed::Leader& leader) {
+  CommandLine app(
+      "Deforms a body as flexel-simulate does, on all ranks of an mpirun: equilibrium of model \"cells\".",
+      kProgram);
+  Arguments arguments;
+  declare(app, arguments);
+  if (!parse_arguments(app, argc, argv)) return kExitDone;
+  leader.give_options(arguments.petsc, arguments.options.threads);
+  lead(arguments, leader);
+  return kExitDone;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const flexel::distributed::Session session(argv);
+  int code = 0;
+  if (flexel::distributed::rank() == 0) {
+    flexel::distributed::Leader leader;
+    code = flexel::run_program(kProgram, [&] { return run(argc, argv, leader); });
+    leader.end(code);
+  } else {
+    close_stdout();
+    code = flexel::run_program(kProgram, [] { return flexel::distributed::follow(); });
+  }
+  // The others wait for this one in the middle of their work.
+  if (flexel::distributed::together()) flexel::distributed::Session::abort(code);
+  return code;
+}

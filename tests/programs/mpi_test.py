@@ -1,0 +1,216 @@
+"""flexel-simulate-mpi: on 1, 2 and 4 ranks the answer of flexel-simulate; what it refuses; errors and killed ranks end all."""
+
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import time
+
+from harness import BIN, Skip, expect, expect_error, expect_ok, expect_only, body, box, main, need, run, scene
+
+PROGRAM = "flexel-simulate-mpi"
+ENVIRONMENT = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1", OMPI_MCA_rmaps_base_oversubscribe="1",
+                   OMPI_MCA_hwloc_base_binding_policy="none",
+                   OMPI_MCA_mpi_yield_when_idle="1")
+MPIRUN = ("mpirun", "--quiet", "-n")
+
+SMALL = """material = "steel"
+[gravity]
+acceleration = ["0 m/s2", "3 m/s2", "-9.81 m/s2"]
+[[fix]]
+where = "xmin"
+[[load]]
+name = "push"
+where = "xmax"
+force = ["10 N", "0 N", "-100 N"]
+[[load]]
+name = "press"
+where = "zmax"
+pressure = "20 kPa"
+[[probe]]
+name = "tip"
+at = ["40 mm", "5 mm", "5 mm"]
+[run]
+tolerance = 1e-11
+"""
+# Far past its thickness; one end is held by elements, the other led and turned.
+LARGE = """material = "rubber"
+[[fix]]
+where = { box = { min = ["-1 mm", "-1 mm", "-1 mm"], max = ["1 mm", "11 mm", "11 mm"] } }
+[[move]]
+name = "led"
+where = { box = { min = ["39 mm", "-1 mm", "-1 mm"], max = ["41 mm", "11 mm", "11 mm"] } }
+displacement = ["free", "free", "15 mm"]
+[[load]]
+name = "aside"
+where = "zmax"
+force = ["0 N", "0.5 N", "0 N"]
+[[probe]]
+name = "middle"
+at = ["20 mm", "5 mm", "5 mm"]
+[run]
+tolerance = 1e-11
+"""
+
+
+def need_mpi():
+    if not (BIN / PROGRAM).exists():
+        raise Skip("built without PETSc and MPI (tools/setup --mpi)")
+    need("mpirun")
+
+
+def mpi(ranks, *arguments, **options):
+    return run(*MPIRUN, ranks, BIN / PROGRAM, *arguments, env=ENVIRONMENT, **options)
+
+
+def points(path):
+    """Positions of the elements and the columns of a body that is not compressed, as meshio reads them."""
+    try:
+        import meshio
+    except ImportError:
+        raise Skip("python3-meshio is not installed") from None
+    return meshio.read(path)
+
+
+def close(one, other, share, what):
+    """Numbers, or nested lists of them, that differ by at most `share` of the largest."""
+    import numpy
+    one, other = numpy.asarray(one, float), numpy.asarray(other, float)
+    expect(one.shape == other.shape, f"{what}: {one.shape} and {other.shape}")
+    scale = numpy.abs(other).max()
+    expect(scale > 0, f"{what}: nothing but zeros")
+    expect(numpy.abs(one - other).max() <= share * scale, f"{what}: off by {numpy.abs(one - other).max() / scale:.1e}, allowed {share:.0e}")
+
+
+def same_answer(ranks, text, *options):
+    need_mpi()
+    scene(text=text)
+    body("body.vtu", *options)
+    expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "one.vtu", "--summary", "one.json", "--threads", "1"))
+    expect_ok(mpi(ranks, "scene.toml", "body.vtu", "-o", "all.vtu", "--summary", "all.json"))
+    one, every = points("one.vtu"), points("all.vtu")
+    close(every.point_data["displacement"], one.point_data["displacement"], 1e-8, "displacements")
+    for column in ("von_mises", "principal_stresses"):
+        if column in one.point_data:
+            close(every.point_data[column], one.point_data[column], 1e-7, column)
+    a, b = json.loads(pathlib.Path("all.json").read_text()), json.loads(pathlib.Path("one.json").read_text())
+    expect(a.keys() == b.keys(), f"the summary has {set(a) ^ set(b)}")
+    close([p["displacement"] for p in a["probes"]], [p["displacement"] for p in b["probes"]], 1e-8, "probes")
+    close([r["force"] for r in a["reactions"]], [r["force"] for r in b["reactions"]], 1e-8, "reactions")
+    close([r["moment"] for r in a["reactions"]], [r["moment"] for r in b["reactions"]], 1e-8, "moments of reactions")
+    close([load["force"] for load in a["loads"]], [load["force"] for load in b["loads"]], 1e-12, "loads")
+    for key in ("elastic_energy", "largest_displacement", "mass", "largest_von_mises", "smallest_jacobian"):
+        close([a[key]], [b[key]], 1e-7, key)
+    close([bar["value"] for bar in a["error_bars"]["bars"]], [bar["value"] for bar in b["error_bars"]["bars"]], 1e-7, "values of bars")
+    close([bar["half_width"] for bar in a["error_bars"]["bars"]], [bar["half_width"] for bar in b["error_bars"]["bars"]], 1e-5, "error bars")
+    expect(a["relative_residual"] <= 1e-11 or a["newton_iterations"] > 1, "the tolerance holds on all ranks")
+    return a, b
+
+
+def test_one_rank():
+    same_answer(1, SMALL)
+
+
+def test_two_ranks():
+    same_answer(2, SMALL)
+
+
+def test_four_ranks_large_deflections():
+    every, one = same_answer(4, LARGE)
+    expect(one["newton_iterations"] > 2, f"the case should not be linear: {one['newton_iterations']} iterations")
+    expect(every["largest_displacement"] > 0.01, "it should go past the thickness of the bar")
+
+
+def test_options_of_petsc():
+    need_mpi()
+    scene(text=SMALL)
+    body("body.vtu")
+    result = expect_ok(mpi(2, "scene.toml", "body.vtu", "-o", "out.vtu", "--no-estimate", "--petsc", "-ksp_view -pc_type jacobi -no_such 3"))
+    expect("type: jacobi" in result.out.decode() and "type: cg" in result.out.decode(), f"-ksp_view should show the solver: {result}")
+    expect("nothing asked for -no_such" in result.err and "-ksp_view" not in result.err.split("nothing asked for")[1],
+           f"unused options should be named: {result}")
+
+
+def test_what_ranks_do_not_do_is_refused():
+    need_mpi()
+    body("body.vtu")
+    fix = 'material = "steel"\n[[fix]]\nwhere = "xmin"\n'
+    load = '[[load]]\nwhere = "xmax"\nforce = ["0 N", "0 N", "-1 N"]\n'
+    cases = {
+        "timed runs": fix + load + '[run]\ntime = "1 ms"\n',
+        "vibrations": fix + "[run]\nmodes = 2\n",
+        "buckling": fix + load + "[run]\nbuckling = 1\n",
+        "contact": fix + load + '[[plane]]\npoint = ["0 mm", "0 mm", "-1 mm"]\nnormal = [0, 0, 1]\n',
+        'model "springs"': 'model = "springs"\n' + fix + load,
+        'model "quadratic"': 'model = "quadratic"\n' + fix + load,
+        "rigid links": fix + load + 'link = "rigid"\n',
+        "loads that turn": fix + load + "follower = true\n",
+        "heat and shrinkage": fix + '[thermal]\nchange = "10 K"\n',
+        "renormalise": fix + load + "[run]\nrenormalise = true\n",
+        "indenters": fix + '[[indenter]]\nball = { centre = ["20 mm", "5 mm", "20 mm"], radius = "8 mm" }\ndisplacement = ["0 mm", "0 mm", "-3 mm"]\n',
+    }
+    for what, text in cases.items():
+        scene(text=text)
+        expect_error(run(PROGRAM, "scene.toml", "body.vtu", "-o", "out.vtu", env=ENVIRONMENT), PROGRAM, what)
+    expect_only("body.vtu", "scene.toml")
+
+
+def test_an_error_is_told_once_and_ends_all_ranks():
+    need_mpi()
+    body("body.vtu")
+    scene(text='material = "steel"\n[[load]]\nwhere = "xmax"\nforce = ["0 N", "0 N", "-1 N"]\n')
+    expect_error(mpi(2, "scene.toml", "body.vtu", "-o", "out.vtu"), PROGRAM, "add a [[fix]]")
+    scene(text=SMALL)
+    expect_error(mpi(2, "scene.toml", "body.vtu", "-o", "out.vtu", "--petsc", "-pc_type nonsense"), PROGRAM, "nonsense")
+    expect_error(mpi(2, "scene.toml", "body.vtu"), PROGRAM, "-o")
+    expect_error(mpi(2, "scene.toml", "none.vtu", "-o", "out.vtu"), PROGRAM, "none.vtu")
+    expect_only("body.vtu", "scene.toml")
+
+
+def test_more_ranks_than_cells():
+    """One cell, which rank 0 solves alone."""
+    need_mpi()
+    scene(text=SMALL)
+    box("bar.stl")
+    expect_ok(run("flexel-voxelize", "bar.stl", "--size", "40 mm", "-o", "body.vtu"))
+    expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "one.vtu", "--no-estimate"))
+    expect_ok(mpi(2, "scene.toml", "body.vtu", "-o", "all.vtu", "--no-estimate"))
+    expect(pathlib.Path("one.vtu").read_bytes() == pathlib.Path("all.vtu").read_bytes(), "the same solver, the same bytes")
+
+
+def ranks_of(process):
+    """The processes that mpirun started, by their parent."""
+    children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    return [int(child) for child in children]
+
+
+def test_a_killed_rank_loses_one_load_step_at_most():
+    need_mpi()
+    scene(text=LARGE + "load_steps = 40\n")
+    body("body.vtu")
+    command = ("scene.toml", "body.vtu", "-o", "out.vtu", "--no-estimate")
+    expect_ok(mpi(2, *command, "--summary", "whole.json"))
+    os.rename("out.vtu", "whole.vtu")
+    with open("told", "wb") as told:
+        process = subprocess.Popen([*MPIRUN, "2", BIN / PROGRAM, *command, "--checkpoint", "steps"], stdout=told, stderr=told, env=ENVIRONMENT)
+        ends = time.monotonic() + 60
+        while not pathlib.Path("steps").exists() and process.poll() is None and time.monotonic() < ends:
+            time.sleep(0.002)
+        expect(process.poll() is None, f"it ended before it was killed: {pathlib.Path('told').read_text()}")
+        os.kill(ranks_of(process)[-1], signal.SIGKILL)
+        expect(process.wait(60) != 0, "mpirun should tell that a rank was killed")
+    expect(not pathlib.Path("out.vtu").exists(), "a job that was killed leaves no result")
+    expect_ok(mpi(2, *command, "--resume", "steps", "--summary", "resumed.json"))
+    whole, resumed = json.loads(pathlib.Path("whole.json").read_text()), json.loads(pathlib.Path("resumed.json").read_text())
+    expect(resumed["load_steps"] < whole["load_steps"], f"{resumed['load_steps']} load steps after {whole['load_steps']}: nothing was kept")
+    close(points("out.vtu").point_data["displacement"], points("whole.vtu").point_data["displacement"], 1e-8, "displacements")
+    scene(text=LARGE + "load_steps = 41\n")
+    expect_error(mpi(2, *command, "--resume", "steps"), PROGRAM, "another scene")
+    data = pathlib.Path("steps").read_bytes()
+    pathlib.Path("steps").write_bytes(data[:-8])
+    expect_error(mpi(2, *command, "--resume", "steps"), PROGRAM, "truncated or damaged")
+
+
+if __name__ == "__main__":
+    main(globals())
