@@ -192,7 +192,7 @@ def test_a_ball_is_carved_out_by_a_click():
 
 def test_a_ball_pushes_where_it_is_dragged_and_a_plate_by_keys():
     bracket()
-    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _), chromium() as browser:
+    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _), chromium(WINDOW) as browser:
         browser.open(url.geturl())
         settle(browser)
         browser.choose("face", "bracket/1")
