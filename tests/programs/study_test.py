@@ -337,7 +337,7 @@ def test_what_is_not_installed_is_said():
 def test_a_scene_that_calculix_cannot_run_is_said():
     need("gmsh", "ccx")
     write("timed.toml", SCENE + "[run]\ntime = \"40 us\"\n")
-    result = expect_ok(run("flexel", "study", box(), "--scene", "timed.toml", "--budget", "4 s", "-o", "study", "--against", "calculix",
+    result = expect_ok(run("flexel", "study", box(), "--scene", "timed.toml", "--budget", "8 s", "-o", "study", "--against", "calculix",
                            timeout=110))
     expect("CalculiX is left out" in result.err and "time" in result.err, result.err)
     expect(json.load(open("study/study.json"))["against"]["refused"] in parsed().text.replace("&quot;", '"'), "the page says why")
