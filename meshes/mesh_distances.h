@@ -1,5 +1,4 @@
-// A grid of OpenVDB's with the distances to triangles. Compiled once, for its templates take most of a minute: the program
-// flexel-meshes and the module flexel-distances.so link the object.
+// A grid of OpenVDB's with the distances to triangles, for the program flexel-meshes and the module flexel-distances.so.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -8,7 +7,7 @@
 namespace flexel::meshes {
 
 struct DistanceJob {
-  const double* points;  // (point_count x 3), in the grid's index space
+  const double* points;  // (point_count x 3), in the grid's index space; taken as float
   std::size_t point_count;
   const std::uint32_t* corners;  // (triangle_count x 3)
   std::size_t triangle_count;

@@ -7,7 +7,7 @@
 #include <gp_Quaternion.hxx>
 #include <gp_Vec.hxx>
 
-#include "base/math/eigenvalues.h"
+#include "base/math/dense.h"
 
 namespace flexel::cad {
 
@@ -31,7 +31,7 @@ RigidMotion rigid_motion(const std::vector<gp_XYZ>& from, const std::vector<gp_X
   matrix.block<1, 3>(0, 1) = skew.transpose();
   matrix.block<3, 1>(1, 0) = skew;
   matrix.block<3, 3>(1, 1) = moment + moment.transpose() - moment.trace() * Eigen::Matrix3d::Identity();
-  const Eigen::Vector4d q = Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d>(matrix).eigenvectors().col(3);
+  const Eigen::Vector4d q = eigen_symmetric(matrix).vectors.col(3);
   RigidMotion found;
   found.motion.SetRotation(gp_Quaternion(q[1], q[2], q[3], q[0]));
   gp_XYZ turned = from_middle;

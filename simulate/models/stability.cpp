@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/math/dense.h"
 #include "base/math/eigenvalues.h"
 #include "base/math/greatest.h"
 #include "base/parallel.h"
@@ -199,9 +200,8 @@ std::vector<double> cell_frequencies(const Problem& problem) {
     const CornersMatrix k = is_springs(problem, p)
                                 ? springs_stiffness(spring_kind(part.lattice, problem.materials[p]))
                                 : cells_stiffness(cell_kind(part.lattice, problem.materials[p]));
-    const Eigen::SelfAdjointEigenSolver<CornersMatrix> eigen(k, Eigen::EigenvaluesOnly);
     const double corner_mass = problem.materials[p].density * part.lattice.spacing.prod() / 8;
-    result.push_back(eigen.eigenvalues()[23] / corner_mass);
+    result.push_back(eigenvalues_symmetric(k)[23] / corner_mass);
   }
   return result;
 }

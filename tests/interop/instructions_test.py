@@ -47,9 +47,8 @@ def test_a_step_runs_what_the_scene_names_and_no_other_effect():
     expect(sum(found.values()) < 0.05 * CELLS**3, f"instructions a step: {found}")
     damped = count(simulate_command(STEPS, EFFECTS["`[damping]`"]))
     expect(sum(of_effects(damped).values()) > 100 * CELLS**3 * STEPS, "damping leaves no trace: the test sees nothing")
-    pushed = of_a_step(lambda steps: simulate_command(steps, EFFECTS["`[[load]]` with a course"]), STEPS)
-    expect(any("flexel::simulate::Loads::add_forces" in f for f in of_effects(pushed)), "a load leaves no trace: the test sees nothing")
-    expect(sum(pushed.values()) > sum(bare.values()), "a load that varies costs nothing")
+    pushed = of_effects(count(simulate_command(STEPS, EFFECTS["`[[load]]` with a course"])))
+    expect(sum(n for f, n in pushed.items() if "flexel::simulate::Loads::add_forces" in f) > CELLS**2 * STEPS, "a load leaves no trace: the test sees nothing")
     without_effects(kernel_only(bare))
 
 

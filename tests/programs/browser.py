@@ -121,8 +121,8 @@ class Browser:
 
 
 @contextlib.contextmanager
-def chromium(size=(1280, 800)):
-    """A browser with an empty profile; the test is skipped where there is none."""
+def chromium(size=(1000, 640)):
+    """A browser with an empty profile, whose every pixel the processor draws; the test is skipped where there is none."""
     for program in ("chromium", "chromedriver"):
         if shutil.which(program) is None:
             raise Skip(f"{program} is not installed")

@@ -63,7 +63,7 @@ def bent_by_hand(browser, url, along="any"):
 
 def test_a_drag_is_the_move_of_flexel_deform():
     bracket()
-    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _), chromium(WINDOW) as browser:
+    with clay("bracket.step", "--size", "5 mm", "--material", "PLA") as (url, _), chromium(WINDOW) as browser:
         x, y = bent_by_hand(browser, url)
         hand = browser.run("return flexelView.clay.frame.hand")
         expect(abs(sum(v * v for v in hand[:3]) ** 0.5 - 0.005) < 3e-4, f"the hand went 5 mm: {hand}")
@@ -81,7 +81,7 @@ def test_a_drag_is_the_move_of_flexel_deform():
             for (let p = 0; p < shape.count; ++p) low = Math.min(low, shape.restOf(p)[2] + shape.displacementOf(p, 0)[2]);
             return low;""")
         expect_silence(browser)
-    expect_ok(run("flexel", "deform", "bracket.step", "--scene", "scene.toml", "--size", "4 mm", "-o", "deform.stl", "--summary", "summary.json", "--no-estimate", "--quiet"))
+    expect_ok(run("flexel", "deform", "bracket.step", "--scene", "scene.toml", "--size", "5 mm", "-o", "deform.stl", "--summary", "summary.json", "--no-estimate", "--quiet"))
     data = pathlib.Path("deform.stl").read_bytes()
     apart = farthest(stl, data)
     expect(apart < 1e-3, f"the part is that of flexel deform within a micrometre: {apart}")
@@ -166,7 +166,7 @@ def expect_drawn_as_saved(browser, url):
 def test_a_ball_is_carved_out_by_a_click():
     """The drawn part, the saved STL and a run of the saved scene are the same; undone, the page has the whole part again."""
     bracket()
-    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _), chromium(WINDOW) as browser:
+    with clay("bracket.step", "--size", "5 mm", "--material", "PLA") as (url, _), chromium(WINDOW) as browser:
         x, y = bent_by_hand(browser, url, "z")
         browser.mouse(("move", x, y), ("up",))
         settle(browser)
@@ -192,7 +192,7 @@ def test_a_ball_is_carved_out_by_a_click():
 
 def test_a_ball_pushes_where_it_is_dragged_and_a_plate_by_keys():
     bracket()
-    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _), chromium() as browser:
+    with clay("bracket.step", "--size", "5 mm", "--material", "PLA") as (url, _), chromium(WINDOW) as browser:
         browser.open(url.geturl())
         settle(browser)
         browser.choose("face", "bracket/1")
@@ -232,7 +232,7 @@ def test_a_ball_pushes_where_it_is_dragged_and_a_plate_by_keys():
 
 def test_a_ball_is_carved_out_by_keys_and_a_page_that_comes_later_draws_it():
     bracket()
-    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _), chromium(WINDOW) as browser:
+    with clay("bracket.step", "--size", "5 mm", "--material", "PLA") as (url, _), chromium(WINDOW) as browser:
         browser.open(url.geturl())
         settle(browser)
         whole, _ = expect_drawn_as_saved(browser, url)

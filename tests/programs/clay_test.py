@@ -123,7 +123,7 @@ def farthest(one, other):
 
 def test_a_face_that_is_led_is_that_of_flexel_deform():
     bracket()
-    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _):
+    with clay("bracket.step", "--size", "5 mm", "--material", "PLA") as (url, _):
         hand = Hand(url, "0123456789abcdef")
         hand.act("hold bracket/1")
         hand.act("grab face bracket/2")
@@ -131,7 +131,7 @@ def test_a_face_that_is_led_is_that_of_flexel_deform():
         expect(frame["place"][-1][:3] == [0, 0, -0.005], f"the tool is there: {frame['place']}")
         bent = saved(url, "part.stl")
         scene = saved(url, "scene.toml").decode()
-    expect_ok(run("flexel", "deform", "bracket.step", "--fix", "bracket/1", "--move", "bracket/2: 0 0 -5 mm", "--material", "PLA", "--size", "4 mm",
+    expect_ok(run("flexel", "deform", "bracket.step", "--fix", "bracket/1", "--move", "bracket/2: 0 0 -5 mm", "--material", "PLA", "--size", "5 mm",
                   "-o", "deform.stl", "--summary", "summary.json", "--quiet"))
     expect(farthest(bent, pathlib.Path("deform.stl").read_bytes()) < 1e-4, "the part is that of flexel deform within 0.1 um")
     reactions = json.loads(pathlib.Path("summary.json").read_text())["simulate"]["reactions"]
@@ -144,7 +144,7 @@ def test_a_face_that_is_led_is_that_of_flexel_deform():
 def test_the_scene_does_the_same_without_hands():
     """A hand pulls and twists at a place, keeps the shape, and pulls again: two scenes in a pipe end in the same."""
     bracket()
-    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _):
+    with clay("bracket.step", "--size", "5 mm", "--material", "PLA") as (url, _):
         hand = Hand(url, "0123456789abcdef")
         hand.act("hold bracket/1", f"grab at {TIP} 0.008")
         hand.act("hand 0 0.001 -0.002")
@@ -254,7 +254,7 @@ ON_TOP = "0.07 0.02 0.006 0 0 1"  # of the arm of the bracket, and where it look
 
 def test_a_push_is_that_of_the_saved_scene():
     bracket()
-    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _):
+    with clay("bracket.step", "--size", "5 mm", "--material", "PLA") as (url, _):
         hand = Hand(url, 16 * "a")
         hand.act("hold bracket/1", f"push ball {ON_TOP} 0.006")
         start = hand.last
@@ -281,7 +281,7 @@ def test_a_push_is_that_of_the_saved_scene():
 
 def test_a_push_at_a_bent_part_and_at_one_that_was_kept():
     bracket()
-    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _):
+    with clay("bracket.step", "--size", "5 mm", "--material", "PLA") as (url, _):
         hand = Hand(url, 16 * "a")
         hand.act("hold bracket/1", "grab face bracket/2")
         hand.act("0 0 0 -0.006")
@@ -303,7 +303,7 @@ def test_a_push_at_a_bent_part_and_at_one_that_was_kept():
 
 def test_a_ball_that_is_led_far_at_once_does_not_pass_through():
     bracket()
-    with clay("bracket.step", "--size", "4 mm", "--material", "rubber") as (url, _):
+    with clay("bracket.step", "--size", "5 mm", "--material", "rubber") as (url, _):
         hand = Hand(url, 16 * "a")
         hand.act("hold bracket/1", f"push ball {ON_TOP} 0.005")
         frame = hand.act("0 0 0 -0.02", "stay")
@@ -328,7 +328,7 @@ def test_a_part_that_is_pulled_onto_a_ball_does_not_pass_through():
 
 def test_a_ball_that_was_led_around_the_part_is_in_no_scene():
     bracket()
-    with clay("bracket.step", "--size", "4 mm", "--material", "rubber") as (url, _):
+    with clay("bracket.step", "--size", "5 mm", "--material", "rubber") as (url, _):
         hand = Hand(url, 16 * "a")
         hand.act("hold bracket/1", f"push ball {ON_TOP} 0.005")
         status, text = hand.post("0 0 0.03 0", "stay", "0 0 0.03 -0.02", "stay", "0 0 0 -0.02", "stay", "0 0 0 -0.014", "stay")
@@ -354,7 +354,7 @@ def at_rest(url):
 
 def test_pushes_that_cannot_be_are_refused():
     bracket()
-    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _):
+    with clay("bracket.step", "--size", "5 mm", "--material", "PLA") as (url, _):
         hand = Hand(url, 16 * "a")
         for wrong, said in (("push", "push: give"), ("push cone 0 0 0 0 0 1 1", "push: give"), ("push ball 0 0 0 0 0 0 1", "no direction"), ("push ball 0 0 0 0 0 1 0", "radius above 0"), ("push ball 0 0 0 0 0 1 1e9", "no number")):
             status, text = hand.post(wrong)
@@ -372,7 +372,7 @@ def test_pushes_that_cannot_be_are_refused():
 
 def test_a_page_gets_the_surface_while_acts_wait():
     bracket()
-    with clay("bracket.step", "--size", "4 mm") as (url, _):
+    with clay("bracket.step", "--size", "5 mm") as (url, _):
         hand = Hand(url, 16 * "a")
         expect("hold a face" in hand.act("carve at 0.04 0.02 0.006 0.009", "keep")["said"], f"nothing holds it: {hand.last['said']}")
         expect(not hand.act("hold bracket/1", "keep")["said"], f"held, it is kept: {hand.last['said']}")

@@ -201,9 +201,12 @@ def test_a_couple_gives_no_stiffness():
 
 
 def test_study_takes_options():
+    """And prints its study.json with --json."""
     box()
-    expect_ok(run("flexel", "study", "box.stl", "--material", "steel", "--fix", "xmin", "--torque", "xmax: 5 N m", "--probe",
-                  "tip: 40 10 10 mm", "--budget", "8 s", "-o", "study", timeout=110))
+    printed = json.loads(expect_ok(run("flexel", "study", "box.stl", "--material", "steel", "--fix", "xmin", "--torque", "xmax: 5 N m", "--probe",
+                                       "tip: 40 10 10 mm", "--budget", "8 s", "-o", "study", "--json", timeout=110)).out)
+    with open("study/study.json", encoding="utf-8") as file:
+        expect(printed == json.load(file) and printed["program"] == "flexel study", "another study.json")
     text = open("study/study-scene.toml").read()
     expect("torque" in text and "tip" in text and 'material = "steel"' in text.replace("'", '"'), text)
     scene("scene.toml")

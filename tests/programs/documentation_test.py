@@ -36,7 +36,14 @@ def test_readme():
 
 
 def test_samples():
-    run_page("samples/README.md")
+    """tests/pipelines runs each script; the page has them all, with no argument more."""
+    folder = SOURCE / "samples/pipelines"
+    commands = re.findall(r"^samples/pipelines/(\w+)\.sh(.*)$", "\n".join(blocks(SOURCE / "samples/README.md")), re.M)
+    on_page = {name: len(arguments.split()) for name, arguments in commands}
+    calls = re.findall(r'\bpipeline\("(\w+)\.sh", (.*?)\)', (SOURCE / "tests/pipelines/pipelines_test.py").read_text(encoding="utf-8"))
+    tested = {name: arguments.count(",") + 1 for name, arguments in calls}
+    expect(set(on_page) == set(tested) == {script.stem for script in folder.glob("*.sh")}, f"{on_page} on the page, tested {tested}")
+    expect(all(0 < number <= tested[name] for name, number in on_page.items()), f"{on_page} on the page, tested {tested}")
 
 
 def test_docs():

@@ -72,12 +72,6 @@ def test_compensate_and_export():
     expect_error(run("flexel", "export", "box.stl", *PULL, "--calculix", "-o", "-", "--json"), "flexel", "stdout")
 
 
-def test_study():
-    box()
-    printed = parsed("study", "box.stl", *PULL[:-2], "-o", "study", "--budget", "8 s", "--json")
-    expect(printed == json.loads(pathlib.Path("study/study.json").read_text()) and printed["program"] == "flexel study", "another study.json")
-
-
 def test_scene_keys():
     groups = parsed("scene-keys", "--json")["groups"]
     keys = {(key["table"], key["key"]) for group in groups for key in group["keys"]}

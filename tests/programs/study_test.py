@@ -14,24 +14,19 @@ import statistics
 import subprocess
 import time
 
-from harness import BIN, SCENE, Skip, box, expect, expect_error, expect_ok, expect_only, main, need, run, scene, write
+from harness import BIN, SCENE, box, expect, expect_error, expect_ok, expect_only, main, need, run, scene, write
 
 TARGETS = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5]
 
 
-def study(*options, budget="12 s", folder="study"):
-    box()
-    return run("flexel", "study", "box.stl", "--scene", scene(), "--budget", budget, "-o", folder, *options, timeout=110)
-
-
 def study_until(enough, *budgets, part="box.stl", scene_file=None):
-    """With the first budget that is enough: on a busy machine a run takes many times as long."""
+    """With the first budget that is enough: on a busy machine a run takes many times as long. What it said, and that budget."""
     box()
     scene_file = scene_file or scene()
     for budget in budgets:
         result = expect_ok(run("flexel", "study", part, "--scene", scene_file, "--budget", budget, "-o", "study", timeout=110))
         if enough(rows_of()):
-            return result
+            return result, float(budget.split()[0])
     raise AssertionError(f"not enough runs in {budgets[-1]}: {[r['label'] for r in rows_of()]}")
 
 
@@ -165,8 +160,12 @@ def errors_follow_from_values_and_references():
 
 
 def test_the_page_says_what_the_table_holds():
-    result = study_until(lambda rows: len(sizes(rows)) >= 3, "12 s", "40 s")
+    """And is one file that a browser opens, made within its budget; a study that cannot begin leaves it as it is."""
+    result, budget = study_until(lambda rows: len(sizes(rows)) >= 3, "12 s", "40 s")
     expect_only("study.csv", "study.html", "study.json", folder="study")
+    expect_the_budget_is_kept(budget)
+    expect_one_file()
+    expect_a_browser_prints_it()
     errors_follow_from_values_and_references()
     rows, page, summary = rows_of(), parsed(), json.load(open("study/study.json"))
     expect(page.sentences == summary["sentences"], f"{page.sentences} {summary['sentences']}")
@@ -188,16 +187,18 @@ def test_the_page_says_what_the_table_holds():
     else:
         told = float(re.search(r"accuracy costs (?:over )?([0-9.,]+) times", said)[1].replace(",", ""))
         expect(abs(told / again["tenfold"] - 1) < 0.06 or told == 10000, f"{told} {again['tenfold']}")
+    expect_one_that_cannot_begin_leaves_it()
 
 
-def test_a_given_reference_goes_before_the_extrapolation():
-    expect_ok(study("--reference", "tip=13 um", budget="8 s"))
-    (tip,) = [r for r in json.load(open("study/study.json"))["references"] if r["name"] == "tip"]
-    expect(tip["value"] == 13e-6 and tip["uncertainty"] == 0 and tip["from"] == "given", f"{tip}")
+def expect_the_budget_is_kept(seconds):
+    took = sum(float(row["wall [s]"]) for row in rows_of())
+    expect(took < seconds, f"the runs fit into {seconds} s: {took} s")
+    summary = json.load(open("study/study.json"))
+    expect(summary["spent"] < seconds + 8, f"the page is within it too, but for what a busy machine takes: {summary['spent']} s")
+    expect(summary["left_out"], "what did not fit is named")
 
 
-def test_the_page_is_one_file_that_fetches_nothing():
-    expect_ok(study(budget="9 s"))
+def expect_one_file():
     page = parsed()
     expect(page.fetched == [] and page.scripts == 0, f"{page.fetched}")
     expect(len(page.ids) == len(set(page.ids)), "ids are unique")
@@ -213,15 +214,26 @@ def test_the_page_is_one_file_that_fetches_nothing():
     expect(len(page.text) < 900_000, f"{len(page.text)} bytes")
 
 
-def test_the_budget_is_kept():
-    expect_ok(study(budget="9 s"))
-    took = sum(float(row["wall [s]"]) for row in rows_of())
-    expect(took < 9, f"the runs fit into 9 s: {took} s")
-    summary = json.load(open("study/study.json"))
-    expect(summary["spent"] < 9 + 8, f"the page is within it too, but for what a busy machine takes: {summary['spent']} s")
-    expect(summary["left_out"], "what did not fit is named")
-    result = study(budget="10 ms")
-    expect_error(result, "flexel", "--budget")
+def expect_a_browser_prints_it():
+    browser = next((shutil.which(name) for name in ("chromium", "chromium-browser", "google-chrome") if shutil.which(name)), None)
+    if browser is None:
+        return
+    done = subprocess.run([browser, "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--v=0",
+                           "--host-resolver-rules=MAP * ~NOTFOUND", "--user-data-dir=profile", "--print-to-pdf=page.pdf",
+                           pathlib.Path("study/study.html").resolve().as_uri()], stderr=subprocess.PIPE, timeout=90, check=False)
+    said = done.stderr.decode(errors="replace")
+    expect(done.returncode == 0 and "CONSOLE" not in said and "ERR_NAME_NOT_RESOLVED" not in said, said)
+    pdf = pathlib.Path("page.pdf").read_bytes()
+    boxes = {tuple(round(float(v)) for v in m.split()) for m in re.findall(rb"/MediaBox\s*\[([^\]]*)\]", pdf)}
+    expect(boxes and all(abs(b[2] - 595) <= 2 and abs(b[3] - 842) <= 2 for b in boxes), f"A4: {boxes}")
+
+
+def expect_one_that_cannot_begin_leaves_it():
+    before = {p.name: p.read_bytes() for p in pathlib.Path("study").iterdir()}
+    write("broken.stl", "solid x\nfacet\n")
+    expect_error(run("flexel", "study", "broken.stl", "--scene", "scene.toml", "-o", "study"), "flexel", "broken.stl")
+    expect_error(run("flexel", "study", "box.stl", "--scene", "scene.toml", "--budget", "10 ms", "-o", "study"), "flexel", "--budget")
+    expect(before == {p.name: p.read_bytes() for p in pathlib.Path("study").iterdir()}, "what was there is there")
 
 
 def test_an_interrupt_keeps_the_rows():
@@ -308,38 +320,27 @@ def test_calculix_stands_beside():
     expect("CalculiX" not in page.sentences[0], f"{page.sentences}")
 
 
-def test_what_calculix_cannot_run_is_said():
-    """A missing program, a scene without a translation: one line, and the study goes on."""
+def test_what_is_not_installed_is_said():
+    """One line, and the study goes on; a reference that is given goes before the extrapolation."""
     box()
     environment = dict(os.environ, PATH="/nowhere")
     result = expect_ok(run("flexel", "study", "box.stl", "--scene", scene(), "--budget", "8 s", "-o", "study", "--against", "calculix",
-                           env=environment, timeout=110))
+                           "--reference", "tip=13 um", env=environment, timeout=110))
     expect("CalculiX is left out" in result.err and "ccx is not installed" in result.err, result.err)
-    expect("ccx is not installed" in parsed().text, "the page says it too")
+    expect("gnuplot is not installed" in result.err and "gnuplot-nox" in result.err, result.err)
+    expect("ccx is not installed" in parsed().text and "gnuplot-nox" in parsed().text, "the page says it too")
     expect(not [r for r in rows_of() if r["sweep"] == "calculix"], "no row")
+    (tip,) = [r for r in json.load(open("study/study.json"))["references"] if r["name"] == "tip"]
+    expect(tip["value"] == 13e-6 and tip["uncertainty"] == 0 and tip["from"] == "given", f"{tip}")
+
+
+def test_a_scene_that_calculix_cannot_run_is_said():
     need("gmsh", "ccx")
     write("timed.toml", SCENE + "[run]\ntime = \"40 us\"\n")
-    result = expect_ok(run("flexel", "study", "box.stl", "--scene", "timed.toml", "--budget", "8 s", "-o", "study", "--against", "calculix",
+    result = expect_ok(run("flexel", "study", box(), "--scene", "timed.toml", "--budget", "8 s", "-o", "study", "--against", "calculix",
                            timeout=110))
     expect("CalculiX is left out" in result.err and "time" in result.err, result.err)
     expect(json.load(open("study/study.json"))["against"]["refused"] in parsed().text.replace("&quot;", '"'), "the page says why")
-
-
-def test_a_study_that_cannot_begin_leaves_the_last_one():
-    expect_ok(study(budget="8 s"))
-    before = {p.name: p.read_bytes() for p in pathlib.Path("study").iterdir()}
-    write("broken.stl", "solid x\nfacet\n")
-    expect_error(run("flexel", "study", "broken.stl", "--scene", "scene.toml", "-o", "study"), "flexel", "broken.stl")
-    expect(before == {p.name: p.read_bytes() for p in pathlib.Path("study").iterdir()}, "what was there is there")
-
-
-def test_without_gnuplot_the_page_says_so():
-    box()
-    environment = dict(os.environ, PATH="/nowhere")
-    result = expect_ok(run("flexel", "study", "box.stl", "--scene", scene(), "--budget", "8 s", "-o", "study", env=environment,
-                           timeout=110))
-    expect("gnuplot is not installed" in result.err and "gnuplot-nox" in result.err, result.err)
-    expect("gnuplot-nox" in parsed().text, "the page says it too")
 
 
 def test_bad_arguments_are_refused_at_once():
@@ -368,21 +369,6 @@ def test_bad_arguments_are_refused_at_once():
                              (["-", "--scene", "scene.toml", "-o", "study"], ["stdin"])):
         expect_error(run("flexel", "study", *arguments), "flexel", *words)
     expect(not list(pathlib.Path(".").glob("study/.flexel*")), "nothing is left")
-
-
-def test_a_browser_opens_the_page():
-    browser = next((shutil.which(name) for name in ("chromium", "chromium-browser", "google-chrome") if shutil.which(name)), None)
-    if browser is None:
-        raise Skip("no Chromium is installed")
-    expect_ok(study(budget="8 s"))
-    done = subprocess.run([browser, "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--v=0",
-                           "--host-resolver-rules=MAP * ~NOTFOUND", "--user-data-dir=profile", "--print-to-pdf=page.pdf",
-                           pathlib.Path("study/study.html").resolve().as_uri()], stderr=subprocess.PIPE, timeout=90, check=False)
-    said = done.stderr.decode(errors="replace")
-    expect(done.returncode == 0 and "CONSOLE" not in said and "ERR_NAME_NOT_RESOLVED" not in said, said)
-    pdf = pathlib.Path("page.pdf").read_bytes()
-    boxes = {tuple(round(float(v)) for v in m.split()) for m in re.findall(rb"/MediaBox\s*\[([^\]]*)\]", pdf)}
-    expect(boxes and all(abs(b[2] - 595) <= 2 and abs(b[3] - 842) <= 2 for b in boxes), f"A4: {boxes}")
 
 
 if __name__ == "__main__":

@@ -246,15 +246,15 @@ def test_progress_of_each_stage():
     flexel = module()
     need_step()
     bracket()
-    part = flexel.Part.from_mesh(*box(), edge=0.00015)
+    part = flexel.Part.from_mesh(*box(), edge=0.0003)
     seen = {}
 
     def hear(name):
         return lambda stage, share, note, left: seen.setdefault((name, stage), []).append(share)
 
-    flexel.read("bracket.step", deflection="0.3 um", edge="1 m", progress=hear("cad"))
-    flexel.voxelize(flexel.Part.from_mesh(*box()), size=0.001, heal="wrap:0.35 mm", progress=hear("wrap"))
-    flexel.voxelize(part, size=0.00025, progress=hear("lattice"))
+    flexel.read("bracket.step", deflection="1 um", edge="1 m", progress=hear("cad"))
+    flexel.voxelize(flexel.Part.from_mesh(*box()), size=0.001, heal="wrap:0.6 mm", progress=hear("wrap"))
+    flexel.voxelize(part, size=0.0005, progress=hear("lattice"))
     bent = flexel.simulate(flexel.voxelize(part, size=0.0025), estimate=False, **PULL).body
     flexel.map(bent, check="self-intersection", progress=hear("map"))
     flexel.picture(bent, progress=hear("picture"))

@@ -295,13 +295,15 @@ struct PinInHole {
 // A pin that is not in the middle of its hole presses as one that is pushed there, however few cells its radius has: the
 // facets do not hide the offset, with an interference or without.
 TEST(Contact, APinOffTheMiddleOfItsHolePressesAsOneThatIsPushedThere) {
-  for (const std::array<double, 3>& at : {std::array{1.3, 0.05, 0.0},
-                                          {1.6, 0.02, 0.0},
-                                          {1.6, 0.05, 0.0},
-                                          {1.6, 0.2, 0.0},
-                                          {1.6, 0.03, 0.03},
-                                          {2.7, 0.03, 0.0},
-                                          {2.7, 0.2, 0.0}})
+  using At = std::array<double, 3>;
+  for (const At& at : less_if_sanitized<std::vector<At>>({{1.3, 0.05, 0.0},
+                                                          {1.6, 0.02, 0.0},
+                                                          {1.6, 0.05, 0.0},
+                                                          {1.6, 0.2, 0.0},
+                                                          {1.6, 0.03, 0.03},
+                                                          {2.7, 0.03, 0.0},
+                                                          {2.7, 0.2, 0.0}},
+                                                         {{1.6, 0.03, 0.03}}, "one pin of seven"))
     for (const std::array<std::uint32_t, 2>& sides : {std::array{40u, 40u}, {18u, 16u}}) {
       const PinInHole pin{at[0], at[1], at[2], sides};
       const double pushed = pin.pressed(false, 0);
@@ -313,8 +315,9 @@ TEST(Contact, APinOffTheMiddleOfItsHolePressesAsOneThatIsPushedThere) {
 
 // A wrong force is told, whatever makes it: a small offset, coarse facets.
 TEST(Contact, AFitIsToldWhereFacetsHideIt) {
+  if (sanitized()) GTEST_SKIP() << "AFitIsNotToldWhereItIsSure goes the same ways through memory";
   std::size_t wrong = 0;
-  for (const double radius : less_if_sanitized<std::vector<double>>({1.3, 2.7}, {1.3}, "one of two radii"))
+  for (const double radius : {1.3, 2.7})
     for (const std::array<std::uint32_t, 2>& sides :
          {std::array{40u, 40u}, {18u, 16u}, {10u, 8u}, {12u, 10u}})
       for (const double offset : {0.005, 0.02, 0.05}) {

@@ -16,6 +16,7 @@
 #include "simulate/linear/vector_products.h"
 #include "simulate/matter/surface_points.h"
 #include "simulate/probes/report.h"
+#include "tests/sanitized.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/centre_body.h"
 #include "tests/simulate/scene_case.h"
@@ -287,6 +288,7 @@ INSTANTIATE_TEST_SUITE_P(Indenters, SymmetricPush,
 // A quarter of a block, six radii of contact wide and high. Its ground is at rest where a half space would have gone by
 // F (1 + nu) (3 - 2 nu) / (2 pi E H) under the ball (Boussinesq).
 TEST(Indenters, ABallResistsAsHertzHasIt) {
+  if (sanitized()) GTEST_SKIP() << "ABallDoesNotPassThroughAPart goes the same ways through memory";
   constexpr int kContact = 3, kWide = 18;
   constexpr double kSpacing = 1e-3, kRadius = 0.03, kPoisson = 0.3;
   const double depth = std::pow(kContact * kSpacing, 2) / kRadius, height = kWide * kSpacing;

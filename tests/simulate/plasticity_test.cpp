@@ -237,7 +237,7 @@ double residual_curvature(int n, double curvature) {
 }
 
 TEST(Plasticity, BeamKeepsItsCurvature) {
-  for (const int n : {12, 16}) {
+  for (const int n : less_if_sanitized<std::vector<int>>({12, 16}, {12}, "one lattice of two")) {
     const double yields = kYield / kMetal.young / (0.5e-3 * n);  // curvature at which the surface yields
     for (const double times : {2.0, 4.0}) {
       const double moment = 1.5 * (1 - 1 / (3 * times * times));  // of that at first yield (Prager and Hodge)

@@ -21,7 +21,7 @@
 namespace flexel::voxelize {
 namespace {
 
-constexpr std::size_t kJudged = 100000;       // samples judged by all three
+constexpr std::size_t kJudged = 30000;        // samples judged by all three
 constexpr std::size_t kJudgedVoxels = 15000;  // of a lattice fine enough for the comparison
 constexpr int kFinest = 9;                    // times as fine
 
