@@ -1,5 +1,6 @@
 // Poses replace those that nobody has taken up yet, so what waits is what was last said. The spring between hand and tool
 // is ten times as stiff as the part where the tool took it, which the first step of a stroke shows: the tool lags a tenth.
+// While the hand moves the part follows roughly, and rests between poses: the processor is needed to draw it.
 #include "flexel/clay/clay_session.h"
 
 #include <fmt/format.h>
@@ -33,10 +34,14 @@ using Json = nlohmann::ordered_json;
 constexpr std::size_t kMostWaiting = 256, kMostHolds = 64, kMostTools = 16, kMostUndo = 100,
                       kMostChanges = 64;
 constexpr std::size_t kMostUndoElements = 5'000'000;  // some 200 bytes each
-constexpr double kDragTolerance = 1e-4, kTolerance = 1e-8;
+constexpr double kFollowTolerance = 1e-2, kDragTolerance = 1e-4, kTolerance = 1e-8;
 constexpr int kDragIterations = 12, kIterations = 40, kMostHalvings = 6;
 constexpr double kSpring = 10;     // times the part's stiffness
 constexpr double kBalance = 1e-4;  // of the way of the hand
+constexpr double kTellingForce =
+    10;  // times what the residual leaves unknown: what a change of force has to be
+constexpr double kLeastWay = 1e-3;  // of the part, that a hand has to go for kBalance to be measured by it
+constexpr std::chrono::milliseconds kQuiet{100};
 constexpr std::chrono::seconds kLease{10}, kPatience{60};
 constexpr const char* kFormats[] = {"stl", "obj", "3mf", "step", "ply", "off", "glb", "vtu"};
 
@@ -238,8 +243,13 @@ std::function<void()> ClaySession::stop_asked() {
 
 // False at the end. No act: the part is still on its way, or the tool has changed hands.
 bool ClaySession::wait(std::optional<Act>& act) {
+  const bool rests = !on_its_way();
   std::unique_lock lock(mutex_);
-  changed_.wait(lock, [&] { return stop_ || news_ || !queue_.empty() || !settled_; });
+  const auto news = [&] { return stop_ || news_ || !queue_.empty(); };
+  if (settled_)
+    changed_.wait(lock, news);
+  else if (rests)
+    changed_.wait_until(lock, quiet_, news);
   act.reset();
   news_ = false;
   if (stop_) return false;
@@ -284,6 +294,7 @@ void ClaySession::perform(const Act& act) {
   if (document_.tools.empty()) throw InputError("no tool is there to be led: pull at a place first");
   if (!stroke_.begun) remember();
   stroke_.begun = true;
+  quiet_ = Clock::now() + kQuiet;
   if (act.kind == Act::Kind::hand) {
     stroke_.hand = act.pose;
   } else {
@@ -503,7 +514,8 @@ ToolPose ClaySession::goal() const {
 void ClaySession::learn_stiffness(const ToolPose& before, const Vec3& force) {
   const Vec3 way = document_.tools.back().pose.displacement - before.displacement;
   const Vec3 more = force - model_->felt().back().force;  // on the part
-  if (!(way.squaredNorm() > 0)) return;
+  const double known = kTellingForce * model_->residual() * force.norm();
+  if (!(way.squaredNorm() > 0) || more.norm() < known) return;
   const double stiffness = more.dot(way) / way.squaredNorm();
   if (!(stiffness > 0)) return;
   stroke_.part = stiffness;
@@ -523,9 +535,7 @@ void ClaySession::lead(bool obeys) {
   double share = 1.0 / document_.tools.back().steps(whole);
   for (int tries = 0; tries < kMostHalvings; ++tries, share /= 2) {
     if (tries > 0 && obeys && more_waits()) return;  // the hand has gone elsewhere
-    const ToolPose pose = share == 1 ? before + whole : before + whole * share;
-    if (!model_->lead(poses_with(share == 1 ? goal() : pose), kDragTolerance, kDragIterations, stop_asked()))
-      continue;
+    if (!led_to(share == 1 ? goal() : before + whole * share)) continue;
     document_.tools.back().pose = model_->poses().back();
     document_.displacement = std::make_shared<const std::vector<Vec3>>(model_->whole_displacement());
     learn_stiffness(before, force);
@@ -533,6 +543,12 @@ void ClaySession::lead(bool obeys) {
   }
   stroke_ = {};
   throw InputError("the part does not follow further: it would fold or buckle");
+}
+
+bool ClaySession::led_to(const ToolPose& pose) {
+  const std::vector<ToolPose> poses = poses_with(pose);
+  return (hand_moves() && model_->follow(poses, kFollowTolerance)) ||
+         model_->lead(poses, kDragTolerance, kDragIterations, stop_asked());
 }
 
 // What is done to the part next happens with the tool where it was led.
@@ -548,19 +564,34 @@ void ClaySession::refine() {
     const std::lock_guard lock(mutex_);
     if (settled_) return;
   }
-  if (!document_.tools.empty() && stroke_.begun) {
-    const ToolPose left = goal() - document_.tools.back().pose;
-    const double way = stroke_.hand ? stroke_.hand->displacement.norm() : stroke_.target.displacement.norm();
-    const double arm = 0.1 * bounding_box(document_.now.body->rest).diagonal();
-    if (std::sqrt(left.dot(left, arm)) > (stroke_.hand ? kBalance * way : 0)) return lead();
-  }
+  if (on_its_way()) return lead();
+  if (hand_moves()) return;
   if (model_) {
-    if (!model_->lead(model_->poses(), kTolerance, kIterations, stop_asked()))
-      throw InputError("no equilibrium is found there");
+    if (!model_->lead(model_->poses(), kTolerance, kIterations, stop_asked())) return retreat();
     document_.displacement = std::make_shared<const std::vector<Vec3>>(model_->whole_displacement());
   }
+  const bool rests = !on_its_way();
   const std::lock_guard lock(mutex_);
-  settle(queue_.empty());
+  settle(rests && queue_.empty());
+}
+
+// Whether the tool is not where it should be yet.
+bool ClaySession::on_its_way() const {
+  if (document_.tools.empty() || !stroke_.begun) return false;
+  const ToolPose left = goal() - document_.tools.back().pose;
+  if (!stroke_.hand) return left.displacement.squaredNorm() + left.turn.squaredNorm() > 0;
+  const double arm = 0.1 * bounding_box(document_.now.body->rest).diagonal();
+  const double way = std::max(stroke_.hand->displacement.norm(), kLeastWay * arm);
+  return std::sqrt(left.dot(left, arm)) > kBalance * way;
+}
+
+// The part was led to where nothing holds it in equilibrium: back to where something did.
+void ClaySession::retreat() {
+  model_->retreat();
+  for (std::size_t t = 0; t < document_.tools.size(); ++t) document_.tools[t].pose = model_->poses()[t];
+  document_.displacement = std::make_shared<const std::vector<Vec3>>(model_->whole_displacement());
+  throw InputError(
+      "the part finds no rest there: it folds, buckles or snaps off; back to where it rested last");
 }
 
 // Under the mutex: nobody sees the part at rest without what it is at rest.
@@ -587,6 +618,7 @@ std::string ClaySession::head(std::size_t bytes) const {
                {"time", 0},
                {"late", false},
                {"line", taken_},
+               {"residual", model_ ? model_->residual() : 0},
                {"felt", felt},
                {"place", place},
                {"tools", names},

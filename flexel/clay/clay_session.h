@@ -68,6 +68,10 @@ class ClaySession {
   void refine();
   void settle(bool settled);
   [[nodiscard]] ToolPose goal() const;
+  [[nodiscard]] bool on_its_way() const;
+  [[nodiscard]] bool hand_moves() const { return Clock::now() < quiet_; }
+  [[nodiscard]] bool led_to(const ToolPose& pose);
+  void retreat();
   [[nodiscard]] std::vector<ToolPose> poses_with(const ToolPose& last) const;
   void learn_stiffness(const ToolPose& before, const Vec3& force);
   void remember();
@@ -86,6 +90,7 @@ class ClaySession {
   std::vector<ClayDocument> undo_, redo_;
   std::unique_ptr<PulledBody> model_;
   Stroke stroke_;
+  Clock::time_point quiet_;  // when the hand will have rested for long enough to find the equilibrium
   std::uint64_t frame_ = 0, grabs_ = 0;
   std::string said_;
   // Of all, under the mutex

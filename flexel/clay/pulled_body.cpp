@@ -1,5 +1,6 @@
-// A hand goes on as it went: the answer of the elements to the last motion of the tools predicts that to the next, and Newton's
-// method begins there. What it then finds is the equilibrium, whatever was predicted.
+// The answers of the elements to the last motions of the tools predict that to the next, and Newton's method begins there. What it
+// then finds is the equilibrium, whatever was predicted. While a hand moves, a step of the linear model or two is enough: a residual
+// of a hundredth is some micrometres of a bracket of 80 mm.
 #include "flexel/clay/pulled_body.h"
 
 #include <algorithm>
@@ -12,6 +13,8 @@
 #include "simulate/equilibrium/equilibrium.h"
 #include "simulate/events/fused.h"
 #include "simulate/indent/indenters.h"
+#include "simulate/linear/conjugate_gradients.h"
+#include "simulate/linear/vector_products.h"
 #include "simulate/matter/coplanar_elements.h"
 #include "simulate/models/rest_shape.h"
 #include "simulate/models/set_rest_shape.h"
@@ -25,6 +28,10 @@ namespace {
 
 constexpr int kLoweringIterations = 40;
 constexpr double kLeastScale = 1e-2;  // of the strongest force so far
+// Following
+constexpr int kMostSteps = 4, kMostGradients = 8;
+constexpr double kLeastForcing = 0.05, kMostForcing = 0.2;  // of the linear solution
+constexpr double kServes = 0.6;  // a step with a tangent that serves leaves at most this of the residual
 
 simulate::Problem problem_of(const simulate::Scene& scene, const Body& body,
                              const simulate::Fragments& fragments) {
@@ -108,9 +115,11 @@ PulledBody::PulledBody(const Body& body, simulate::Scene scene, std::vector<LedT
       fragments_(simulate::find_fragments(body)),
       problem_((refuse_unled(scene, body, pushers_of(tools)), problem_of(scene, body, fragments_))),
       tools_(std::move(tools)),
-      arm_(arm),
       poses_(std::move(started)),
-      felt_(tools_.size()) {
+      felt_(tools_.size()),
+      answers_(arm),
+      rested_(start),
+      rested_poses_(poses_) {
   std::vector<simulate::Tie>& ties = scene.get<simulate::Supports>().ties;
   std::vector<simulate::Indenter>& indenters = scene.get<simulate::Indenters>().indenters;
   std::size_t tie = ties.size() - (tools_.size() - indenters.size()), indenter = 0;
@@ -136,7 +145,7 @@ PulledBody::PulledBody(const Body& body, simulate::Scene scene, std::vector<LedT
 bool PulledBody::lead(const std::vector<ToolPose>& poses, double tolerance, int iterations,
                       const std::function<void()>& stop) {
   return solve(poses, tolerance, iterations, true, stop) ||
-         (!answer_.empty() && solve(poses, tolerance, iterations, false, stop));
+         (!answers_.empty() && solve(poses, tolerance, iterations, false, stop));
 }
 
 bool PulledBody::solve(const std::vector<ToolPose>& poses, double tolerance, int iterations, bool predicted,
@@ -146,22 +155,13 @@ bool PulledBody::solve(const std::vector<ToolPose>& poses, double tolerance, int
       indenters ? indenters->places(state_.share) : std::vector<simulate::IndenterPlace>{};
   lead_ties(poses);
   simulate::State trial = state_;
-  if (predicted && !answer_.empty()) {
-    double along = 0, length = 0;
-    for (std::size_t t = 0; t < poses.size(); ++t) {
-      along += way_[t].dot(poses[t] - poses_[t], arm_);
-      length += way_[t].dot(way_[t], arm_);
-    }
-    const double share = length > 0 ? along / length : 0;
-    parallel_for_each(trial.displacement.size(),
-                      [&](std::size_t e) { trial.displacement[e] += share * answer_[e]; });
-  }
+  if (predicted) answers_.add(way_between(poses_, poses), trial.displacement);
   simulate::NewtonOptions options;
   options.steps = simulate::NewtonSteps::full;
   options.tolerance = tolerance;
   options.max_iterations = iterations;
-  // A tool that leaves the part leaves no force to measure the others by.
-  if (pushers_of(tools_) > 0) options.least_scale = kLeastScale * strongest_;
+  // A tool that leaves the part, or comes back to where it began, leaves no force to measure the others by.
+  options.least_scale = kLeastScale * strongest_;
   const simulate::State begun = trial;
   const auto asked = [&](double, const std::string&) { stop(); };
   simulate::NewtonOutcome outcome = simulate::newton(*mechanics_, trial, options, asked, &memory_);
@@ -179,12 +179,80 @@ bool PulledBody::solve(const std::vector<ToolPose>& poses, double tolerance, int
     lead_ties(poses_);
     return false;
   }
-  const std::vector<Vec3> before = std::exchange(state_, std::move(trial)).displacement;
-  learn(poses, before);
-  residual_ = outcome.relative_residual;
-  poses_ = poses;
-  measure();
+  accept(std::move(trial), poses, outcome.relative_residual);
+  measure(mechanics_->forces(state_).total);
+  rested_ = state_.displacement;
+  rested_poses_ = poses_;
   return true;
+}
+
+bool PulledBody::follow(const std::vector<ToolPose>& poses, double tolerance) {
+  if (!memory_.factored || memory_.projected || mechanics_->follows() || pushers_of(tools_) > 0) return false;
+  lead_ties(poses);
+  simulate::State begun = state_;
+  answers_.add(way_between(poses_, poses), begun.displacement);
+  apply(mechanics_->constraints(), body_, begun, begun.displacement);
+  Iterate at = iterate(std::move(begun));
+  bool found = at.residual <= tolerance;
+  for (int step = 0; !found && step < kMostSteps && improve(at, tolerance); ++step)
+    found = at.residual <= tolerance;
+  if (!found || !std::isfinite(mechanics_->energy(at.state))) {
+    lead_ties(poses_);
+    return false;
+  }
+  accept(std::move(at.state), poses, at.residual);
+  measure(at.forces.total);
+  return true;
+}
+
+PulledBody::Iterate PulledBody::iterate(simulate::State state) {
+  Iterate at{std::move(state), {}, {}};
+  at.forces = mechanics_->forces(at.state);
+  at.unbalanced = at.forces.total;
+  clear_prescribed(mechanics_->constraints(), at.unbalanced);
+  const double scale = std::max(at.forces.scale, kLeastScale * strongest_);
+  at.residual = std::sqrt(simulate::dot(at.unbalanced, at.unbalanced)) / scale;
+  return at;
+}
+
+// One step of the linear model, or a new tangent where the old one does not serve any more. False where neither helps.
+bool PulledBody::improve(Iterate& at, double tolerance) {
+  if (!std::isfinite(at.residual)) return false;
+  const double forcing = std::clamp(0.3 * tolerance / at.residual, kLeastForcing, kMostForcing);
+  std::vector<Vec3> step;
+  const simulate::LinearResult linear = conjugate_gradients(mechanics_->whole_tangent(), at.unbalanced, step,
+                                                            *memory_.preconditioner, forcing, kMostGradients);
+  if (linear.indefinite) return false;
+  simulate::State moved = at.state;
+  parallel_for_each(step.size(), [&](std::size_t e) { moved.displacement[e] += step[e]; });
+  Iterate next = iterate(std::move(moved));
+  if (next.residual <= std::max(tolerance, kServes * at.residual))
+    at = std::move(next);
+  else
+    renew_tangent(at.state);
+  return true;
+}
+
+void PulledBody::renew_tangent(const simulate::State& state) {
+  mechanics_->assemble(state, {});
+  mechanics_->eliminate_prescribed();
+  memory_.preconditioner->refresh_smoother();
+  memory_.stale = true;
+}
+
+void PulledBody::accept(simulate::State state, const std::vector<ToolPose>& poses, double residual) {
+  answers_.learn(way_between(poses_, poses), state_.displacement, state.displacement);
+  state_ = std::move(state);
+  poses_ = poses;
+  residual_ = residual;
+}
+
+void PulledBody::retreat() {
+  state_.displacement = rested_;
+  poses_ = rested_poses_;
+  memory_ = {};
+  lead_ties(poses_);
+  measure(mechanics_->forces(state_).total);
 }
 
 // Ties and indenters hold the links, at the load's whole share.
@@ -195,20 +263,11 @@ void PulledBody::lead_ties(const std::vector<ToolPose>& poses) {
   }
 }
 
-void PulledBody::learn(const std::vector<ToolPose>& poses, const std::vector<Vec3>& before) {
-  double length = 0;
-  for (std::size_t t = 0; t < poses.size(); ++t)
-    length += (poses[t] - poses_[t]).dot(poses[t] - poses_[t], arm_);
-  if (!(length > 1e-12 * arm_ * arm_)) return;  // rounding would speak
-  way_.resize(poses.size());
-  for (std::size_t t = 0; t < poses.size(); ++t) way_[t] = poses[t] - poses_[t];
-  answer_.resize(before.size());
-  parallel_for_each(before.size(), [&](std::size_t e) { answer_[e] = state_.displacement[e] - before[e]; });
-}
-
-void PulledBody::measure() {
+// `unbalanced`: all forces on the elements [N], those on prescribed components too.
+void PulledBody::measure(const std::vector<Vec3>& unbalanced) {
   simulate::SimulateResult found;
-  mechanics_->report(state_, found);
+  for (const simulate::ActiveEffect& effect : mechanics_->effects())
+    effect->report(state_, unbalanced, found);
   for (std::size_t t = 0; t < felt_.size(); ++t) {
     const simulate::Reaction& reaction = found.reactions[reaction_[t]];
     const Vec3 middle = tools_[t].middle + poses_[t].displacement;

@@ -1,5 +1,5 @@
 // A body that stays in equilibrium while tools lead places of it: each solution begins where the last one ended, and keeps its
-// tangent and preconditioner while they serve.
+// tangent and preconditioner while they serve. While a hand moves it follows roughly.
 #pragma once
 #include <array>
 #include <functional>
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "flexel/clay/tool_pose.h"
+#include "flexel/clay/answers.h"
 #include "simulate/equilibrium/newton.h"
 #include "simulate/indent/indenter_shape.h"
 #include "simulate/matter/fragments.h"
@@ -55,6 +55,12 @@ class PulledBody {
   bool lead(const std::vector<ToolPose>& poses, double tolerance, int iterations,
             const std::function<void()>& stop);
 
+  // Moves near the equilibrium with tools at `poses`: to a residual of `tolerance`, with the tangent that is there while it serves,
+  // at a fraction of what lead() costs. False, and nothing has changed, where that is not enough, or a tool pushes.
+  bool follow(const std::vector<ToolPose>& poses, double tolerance);
+  // Back to where lead() found an equilibrium last, or where it began.
+  void retreat();
+
   struct Felt {
     Vec3 force = Vec3::Zero(),
          torque = Vec3::Zero();  // N, N m about the tool's middle as it is now: by the part
@@ -71,8 +77,17 @@ class PulledBody {
  private:
   [[nodiscard]] bool solve(const std::vector<ToolPose>& poses, double tolerance, int iterations,
                            bool predicted, const std::function<void()>& stop);
-  void learn(const std::vector<ToolPose>& poses, const std::vector<Vec3>& before);
-  void measure();
+  struct Iterate {
+    simulate::State state;
+    simulate::Forces forces;
+    std::vector<Vec3> unbalanced;  // (elements) N, on free components
+    double residual = 0;           // relative
+  };
+  [[nodiscard]] Iterate iterate(simulate::State state);
+  [[nodiscard]] bool improve(Iterate& at, double tolerance);
+  void renew_tangent(const simulate::State& state);
+  void accept(simulate::State state, const std::vector<ToolPose>& poses, double residual);
+  void measure(const std::vector<Vec3>& unbalanced);
   void lead_ties(const std::vector<ToolPose>& poses);
 
   const Body& body_;
@@ -84,12 +99,11 @@ class PulledBody {
   std::vector<LedTool> tools_;
   std::vector<std::shared_ptr<simulate::RigidLink>> links_;  // (tools) that ties and indenters follow
   std::vector<std::size_t> reaction_;                        // (tools) numbers of theirs
-  double arm_;
   std::vector<ToolPose> poses_;
   std::vector<Felt> felt_;
-  // The way that the last motion of the tools led the elements: how they answer to more of it.
-  std::vector<ToolPose> way_;
-  std::vector<Vec3> answer_;             // (elements) m
+  Answers answers_;
+  std::vector<Vec3> rested_;             // (elements) m, at the last equilibrium
+  std::vector<ToolPose> rested_poses_;   // (tools) likewise
   double residual_ = 0, strongest_ = 0;  // 1; N, of a tool so far
 };
 

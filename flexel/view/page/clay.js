@@ -284,6 +284,7 @@ export class Clay {
         if (!answer.ok) throw new Error(await answer.text());
         this.panel.replaceSurface(await unpack(new Uint8Array(await answer.arrayBuffer())));
         this.shape = this.panel.shape;
+        this.carriedRest = undefined;
         this.surface = number;
       }
       this.controls.probes.clear();
@@ -305,6 +306,7 @@ export class Clay {
       this.fresh = undefined;
     }
     this.showState();
+    this.picture.drawNow();
     ++this.shown;
     const arrived = this.sent.filter(each => each.line <= this.frame.line);
     if (arrived.length > 0) {
@@ -315,20 +317,29 @@ export class Clay {
     this.vibrate();
   }
 
+  // Where the elements carry the points at rest: (points x 3) m.
+  carriedFrom() {
+    const {rest, shape: {count, carriers, weights}} = this, from = new Float64Array(3 * count);
+    for (let a = 0; a < kCorners * count; ++a)
+      for (let c = 0; c < 3; ++c) from[3 * Math.floor(a / kCorners) + c] += weights[a] * rest[3 * carriers[a] + c];
+    return from;
+  }
+
   // The points where their elements carry them.
   bend(positions) {
-    const {shape, rest} = this, {carriers, weights} = shape, moved = shape.live ?? new Float32Array(3 * shape.count);
-    for (let p = 0; p < shape.count; ++p) {
-      let x = 0, y = 0, z = 0;
-      for (let a = kCorners * p; a < kCorners * (p + 1); ++a) {
+    const {shape} = this, {carriers, weights} = shape, moved = shape.live ?? new Float32Array(3 * shape.count);
+    const from = this.carriedRest ??= this.carriedFrom();
+    for (let p = 0, i = 0, a = 0; p < shape.count; ++p, i += 3) {
+      let x = -from[i], y = -from[i + 1], z = -from[i + 2];
+      for (const end = a + kCorners; a < end; ++a) {
         const e = 3 * carriers[a], w = weights[a];
-        x += w * (positions[e] - rest[e]);
-        y += w * (positions[e + 1] - rest[e + 1]);
-        z += w * (positions[e + 2] - rest[e + 2]);
+        x += w * positions[e];
+        y += w * positions[e + 1];
+        z += w * positions[e + 2];
       }
-      moved[3 * p] = x;
-      moved[3 * p + 1] = y;
-      moved[3 * p + 2] = z;
+      moved[i] = x;
+      moved[i + 1] = y;
+      moved[i + 2] = z;
     }
     shape.setLive(moved);
     this.picture.ranges.clear();

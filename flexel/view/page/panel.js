@@ -1,5 +1,5 @@
 // One file: its shapes, and what three.js draws of them.
-import {clipUniforms, colourOf, cutMaterial, lineMaterial, markMaterials, surfaceMaterial} from "./paint.js";
+import {clipUniforms, colourOf, cutMaterial, lineMaterial, markMaterials, specialise, surfaceMaterial} from "./paint.js";
 import {coarseTriangles} from "./coarse.js";
 import {DrawnShape} from "./shape.js";
 
@@ -63,7 +63,8 @@ class Drawing {
     }
   }
   // A ghost is not cut open but cut off.
-  show(visible, cut, ghost) {
+  show(visible, cut, ghost, coloured) {
+    for (const {material} of [this.surface, this.outside, this.inside]) specialise(material, {coloured, cut});
     this.surface.visible = visible && (!cut || ghost);
     this.outside.visible = this.inside.visible = visible && cut && !ghost;
     if (visible) this.ghost = ghost;
@@ -192,7 +193,7 @@ export class Panel {
   }
 
   // Shows only what is after, or only what was before (`wipe`), or both as `before` says.
-  choose(before, edges, side, coarse) {
+  choose(before, edges, side, coarse, coloured) {
     const hasBefore = before !== "nothing" && this.shape.moved;
     const after = this.after, rest = hasBefore ? this.before : undefined;
     for (const [kind, each] of Object.entries(this.restDrawings ?? {})) each.group.visible = hasBefore && kind === this.kind;
@@ -200,11 +201,11 @@ export class Panel {
     const cut = this.clip.cut.value;
     after.coarse = coarse;
     if (rest) rest.coarse = coarse;
-    after.show(true, cut, false);
+    after.show(true, cut, false, coloured);
     after.creases.visible = after.borders.visible = edges;
     if (!rest) return;
     rest.group.visible = before !== "wipe" || side === "before";
-    rest.show(before !== "lines", cut, before === "ghost");
+    rest.show(before !== "lines", cut, before === "ghost", coloured);
     rest.creases.visible = before === "lines" || before === "ghost" || edges;
     rest.borders.visible = before === "wipe" && edges;
     rest.creases.material.uniforms.ink.value = colourOf(before === "wipe" ? kEdgeInk.light : this.restInk ?? kRestInk.light);

@@ -23,7 +23,7 @@ function compose(picture, target) {
 
 // The PNG as a blob; what was drawn is there until the browser has shown it.
 export function pictureBlob(picture) {
-  picture.coarse = false;
+  picture.coarse = picture.rough = false;
   picture.draw();
   const target = compose(picture, document.createElement("canvas"));
   return new Promise(resolve => target.toBlob(resolve, "image/png"));

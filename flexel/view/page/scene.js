@@ -4,6 +4,7 @@ import {logTicks, numberText, roundBelow, roundTicks} from "./numbers.js";
 import {drawAxes, drawLegend, drawScaleBar, themeOf, write} from "./overlay.js";
 import {colourUniforms} from "./paint.js";
 import {Panel} from "./panel.js";
+import {drawsWithProcessor, Rough} from "./rough.js";
 
 const kLegendEms = 9.5, kSlow = 100, kMostSlow = 2, kRest = 700;  // ms, frames, ms
 
@@ -15,6 +16,7 @@ export class Picture {
     this.overlay = overlay;
     this.renderer = new THREE.WebGLRenderer({canvas, antialias: true, alpha: true});
     this.renderer.autoClear = false;
+    if (drawsWithProcessor(this.renderer.getContext())) this.sketch = new Rough(this.renderer);
     this.renderer.setScissorTest(true);
     this.colours = colourUniforms(page.colours);
     this.panels = packs.map(pack => new Panel(pack, this.colours, page.colours.tints));
@@ -85,7 +87,6 @@ export class Picture {
 
   paint() {
     const {state, colours} = this, coloured = state.colour !== "none";
-    colours.coloured.value = coloured;
     if (!coloured) return;
     const {factor} = this.unit(state.colour), [low, high] = this.ends;
     colours.low.value = low / factor;
@@ -165,6 +166,7 @@ export class Picture {
   // Redraws what is in motion: roughly where frames were slow, and fully once it rests.
   move() {
     this.coarse = this.slow >= kMostSlow;
+    this.rough = this.sketch !== undefined;
     clearTimeout(this.resting);
     this.redraw();
   }
@@ -174,7 +176,7 @@ export class Picture {
     requestAnimationFrame(() => {
       clearTimeout(this.resting);
       this.resting = setTimeout(() => {
-        this.coarse = false;
+        this.coarse = this.rough = false;
         this.redraw();
       }, kRest);
     });
@@ -186,14 +188,21 @@ export class Picture {
     this.asked = true;
     const began = performance.now();
     requestAnimationFrame(() => {
-      this.asked = false;
+      if (!this.asked) return;
       const wait = performance.now() - began;
       if (!this.coarse && this.slow < kMostSlow) this.slow = wait < kSlow ? 0 : this.slow + (wait < 4 * kSlow ? 1 : kMostSlow);
-      this.draw();
-      if (this.coarse) this.rest();
+      this.drawNow();
     });
   }
   slow = 0;
+
+  // What redraw() was asked for, without waiting for the next frame of the screen.
+  drawNow() {
+    if (!this.asked) return;
+    this.asked = false;
+    this.draw();
+    if (this.coarse || this.rough) this.rest();
+  }
 
   draw() {
     if (!this.width) return;
@@ -203,7 +212,13 @@ export class Picture {
     renderer.setViewport(0, 0, this.width, this.height);
     renderer.setClearColor(0, 0);
     renderer.clear();
+    if (this.rough) this.sketch.begin(this.canvas.width, this.canvas.height);
     this.panels.forEach((panel, k) => this.drawPanel(panel, layout[k]));
+    if (this.rough) {
+      renderer.setScissor(0, 0, this.width, this.height);
+      renderer.setViewport(0, 0, this.width, this.height);
+      this.sketch.end();
+    }
     this.drawOver(layout);
     ++this.drawn;
     this.onDraw?.();
@@ -212,10 +227,13 @@ export class Picture {
   drawPanel(panel, {x, y, width, height}) {
     const {renderer, state} = this, bottom = this.height - y - height;
     this.view.apply(panel.camera, this.radiusOf(panel), width / height);
+    const pixels = box => box.map(value => value * this.pixelRatio);
     renderer.setViewport(x, bottom, width, height);
     const part = (from, to, side) => {
-      panel.choose(state.before, state.edges, side, this.coarse);
-      renderer.setScissor(x + from * width, bottom, (to - from) * width, height);
+      const box = [x + from * width, bottom, (to - from) * width, height];
+      panel.choose(state.before, state.edges, side, this.coarse, this.hasLegend);
+      renderer.setScissor(...box);
+      if (this.rough) this.sketch.room(pixels([x, bottom, width, height]), pixels(box));
       renderer.render(panel.scene, panel.camera);
     };
     if (state.before !== "wipe" || !panel.shape.moved) return part(0, 1, "both");

@@ -76,8 +76,12 @@ export class DrawnShape {
 
   placeLive(scale, position, normal) {
     const {steps, lower, step} = this.rest;
-    for (let i = 0; i < steps.length; ++i)
-      position[i] = lower[i % 3] - this.centre[i % 3] + step * steps[i] + scale * this.live[i];
+    const {live, centre} = this, x = lower[0] - centre[0], y = lower[1] - centre[1], z = lower[2] - centre[2];
+    for (let i = 0; i < steps.length; i += 3) {
+      position[i] = x + step * steps[i] + scale * live[i];
+      position[i + 1] = y + step * steps[i + 1] + scale * live[i + 1];
+      position[i + 2] = z + step * steps[i + 2] + scale * live[i + 2];
+    }
     this.setNormals(position, normal);
   }
 
