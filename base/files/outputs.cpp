@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "base/error.h"
@@ -34,6 +35,27 @@ bool same_file(const std::string& a, const std::string& b) {
   return !first.empty() && first == place(b);
 }
 
+// Whether a name is that of a frame of the series NAME.pvd: NAME_00000.vtu.
+bool is_frame_name(const std::string& name, const std::string& series) {
+  if (!name.starts_with(series + "_") || !name.ends_with(".vtu")) return false;
+  const std::string number = name.substr(series.size() + 1, name.size() - series.size() - 5);
+  return number.size() >= 5 &&
+         std::all_of(number.begin(), number.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+// The file that a series (.pvd) at `path` would put a frame in place of, one of the inputs; "" where there is none.
+std::string replaced_by_frames(const std::string& path, const std::vector<std::string>& inputs) {
+  if (extension(path) != "pvd") return "";
+  std::error_code none;
+  const fs::path folder = fs::absolute(path, none).parent_path();
+  for (fs::directory_iterator each(folder, none), end; each != end; each.increment(none)) {
+    if (!is_frame_name(each->path().filename().string(), stem(path))) continue;
+    for (const std::string& input : inputs)
+      if (!input.empty() && input != "-" && fs::equivalent(each->path(), input, none)) return input;
+  }
+  return "";
+}
+
 }  // namespace
 
 void check_outputs(const std::vector<OutputName>& outputs, const std::vector<std::string>& inputs,
@@ -54,6 +76,11 @@ void check_outputs(const std::vector<OutputName>& outputs, const std::vector<std
       if (!input.empty() && input != "-" && same_file(path, input))
         throw InputError(path,
                          "is an input of this command: name another output, or add --force to replace it");
+    if (const std::string input = replaced_by_frames(path, inputs); !input.empty())
+      throw InputError(path,
+                       fmt::format("its frames are named like {}, an input of this command: name another "
+                                   "output, or add --force to replace it",
+                                   input));
   }
   for (const OutputName& output : outputs)
     if (!is_pattern(output.path)) refuse_unwritable(output.path, output.binary);

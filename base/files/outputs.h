@@ -14,7 +14,7 @@ struct OutputName {
 };
 
 // Throws InputError: an output that cannot be written, two that are one file (by links too) or both stdout,
-// and, without `force`, one that is an input. Devices may be given twice.
+// and, without `force`, one that is an input, or a series (.pvd) with a frame that is one. Devices may be given twice.
 void check_outputs(const std::vector<OutputName>& outputs, const std::vector<std::string>& inputs,
                    bool force);
 

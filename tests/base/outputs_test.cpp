@@ -52,6 +52,19 @@ TEST(Outputs, OneFileByTwoNamesIsFound) {
       ThrowsMessage<InputError>(HasSubstr("two results would go to stdout")));
 }
 
+TEST(Outputs, FramesOfASeriesAreNotInputs) {
+  const Scratch scratch;
+  const std::string frame = scratch.write("run_00003.vtu", "a body");
+  std::filesystem::create_symlink("run_00003.vtu", scratch.path("other_00000.vtu"));
+  for (const char* series : {"run.pvd", "other.pvd"}) {
+    EXPECT_THAT([&] { check_outputs({{scratch.path(series)}}, {frame}, false); },
+                ThrowsMessage<InputError>(HasSubstr("run_00003.vtu, an input of this command")));
+    EXPECT_NO_THROW(check_outputs({{scratch.path(series)}}, {frame}, true));
+  }
+  for (const char* series : {"ru.pvd", "run_00003.pvd", "run.vtu"})
+    EXPECT_NO_THROW(check_outputs({{scratch.path(series)}}, {frame}, false));
+}
+
 TEST(Outputs, AppearTogetherOrNotAtAll) {
   const Scratch scratch;
   const std::string first = scratch.write("first", "old"), second = scratch.path("second");
