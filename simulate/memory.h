@@ -8,8 +8,7 @@
 
 namespace flexel::simulate {
 
-// Nothing where that is not known: contact, rigid parts, implicit steps, several models, vibrations and buckling in model
-// `quadratic`. Of model `quadratic` the cells that supports or bonds hold are not counted, which are found by the run:
+// Nothing where that is not known: vibrations and buckling in model `quadratic`, `quadratic` or `paper` beside another model. Of model `quadratic` the cells that supports or bonds hold are not counted, which are found by the run:
 // some tenth, but where a large face is held.
 [[nodiscard]] std::optional<MemoryNeeded> memory_needed(const Body& body, const Scene& scene);
 

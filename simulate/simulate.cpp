@@ -412,9 +412,10 @@ void explain_memory(const Body& body, const Scene& scene, Progress& progress) {
   const std::optional<MemoryNeeded> needed = memory_needed(body, scene);
   if (!needed) return;
   const bool more = needed->with_large_deflections > needed->bytes;
-  progress.say(fmt::format(
-      "memory: about {}{}", human_bytes(needed->bytes),
-      more ? ", with large deflections " + human_bytes(needed->with_large_deflections) : std::string()));
+  progress.say(
+      fmt::format("memory: about {}{}", human_bytes(needed->bytes),
+                  more ? ", with large deflections up to " + human_bytes(needed->with_large_deflections)
+                       : std::string()));
 }
 
 }  // namespace

@@ -4,11 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdlib>
 
 #include "base/error.h"
 #include "base/stop.h"
+#include "flexel/lammps/input_files.h"
+#include "formats/part/surface.h"
 
 namespace flexel::lammps {
 namespace {
@@ -54,23 +57,27 @@ std::string DumpReader::line(const char* of) {
 
 std::uint64_t DumpReader::whole(const std::string& text, const char* what) const {
   char* end = nullptr;
+  errno = 0;
   const std::uint64_t value = std::strtoull(text.c_str(), &end, 10);
-  if (end == text.c_str() || *end != '\0' || text.front() == '-')
+  if (end == text.c_str() || *end != '\0' || text.front() == '-' || errno == ERANGE)
     fail(fmt::format("the {} is no whole number: \"{}\"", what, text));
   return value;
 }
 
-double DumpReader::number(const std::string& text, const char* what) const {
+double DumpReader::number(const std::string& text, const char* what, double largest) const {
   char* end = nullptr;
   const double value = std::strtod(text.c_str(), &end);
   if (end == text.c_str() || *end != '\0') fail(fmt::format("{} is no number: \"{}\"", what, text));
-  if (!std::isfinite(value))
+  if (!(std::abs(value) <= largest))
     fail(fmt::format("{} is \"{}\": the run in LAMMPS broke down; give [run] a shorter step", what, text));
   return value;
 }
 
 void DumpReader::read_columns(const std::string& header) {
   const std::vector<std::string> names = words(header.substr(std::string(kAtoms).size()));
+  const auto run = std::find_if(names.begin(), names.end(),
+                                [](const std::string& name) { return name.starts_with(kRunPrefix); });
+  run_ = run == names.end() ? "" : *run;
   columns_ = names.size();
   for (std::size_t c = 0; c < kColumns.size(); ++c) {
     const auto found = std::find(names.begin(), names.end(), kColumns[c]);
@@ -96,7 +103,7 @@ void DumpReader::read_atom(DumpFrame& frame, std::vector<bool>& seen) {
   seen[id - 1] = true;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<Eigen::Index>(axis);
-    frame.position[id - 1][i] = number(at(1 + axis), kColumns[1 + axis]);
+    frame.position[id - 1][i] = number(at(1 + axis), kColumns[1 + axis], kLargestCoordinate);
     if (!frame.velocity.empty()) frame.velocity[id - 1][i] = number(at(4 + axis), kColumns[4 + axis]);
   }
 }
@@ -112,7 +119,8 @@ void DumpReader::read_atoms(DumpFrame& frame) {
 }
 
 // What stands below a header "ITEM: NAME".
-void DumpReader::read_item(const std::string& name, DumpFrame& frame) {
+void DumpReader::read_item(const std::string& name, DumpFrame& frame, std::set<std::string>& items) {
+  if (!items.insert(name).second) fail(fmt::format("\"{}\" is there twice in one frame", name));
   const auto only = [&](const char* what) {
     const std::vector<std::string> values = words(line(what));
     if (values.size() != 1) fail(fmt::format("one number is wanted below \"ITEM: {}\"", what));
@@ -148,19 +156,24 @@ std::optional<DumpFrame> DumpReader::next() {
   } while (words(item).empty());
   if (file_.eof()) fail_cut("header");
   DumpFrame frame;
+  std::set<std::string> items;
   for (;; item = line("header")) {
     const std::string name = item.substr(0, item.find_last_not_of(" \t\r") + 1);
-    if (!name.starts_with(kAtoms)) {
-      read_item(name, frame);
+    if (name != kAtoms && !name.starts_with(std::string(kAtoms) + " ")) {
+      read_item(name, frame, items);
       continue;
     }
+    for (const char* wanted : {"ITEM: TIMESTEP", "ITEM: NUMBER OF ATOMS"})
+      if (!items.contains(wanted)) fail(fmt::format("the frame has no \"{}\"", wanted));
     if (last_ && frame.step <= *last_)
       fail(fmt::format(
           "step {} is not later than step {} of the frame before: the dump holds two runs, or its "
           "frames are out of order",
           frame.step, *last_));
+    const std::optional<std::string> before = last_ ? std::optional(run_) : std::nullopt;
     last_ = frame.step;
     read_columns(name);
+    if (before && *before != run_) fail("the frame is of another run than the one before");
     read_atoms(frame);
     return frame;
   }

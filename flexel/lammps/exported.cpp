@@ -12,6 +12,7 @@
 #include "base/files/output_file.h"
 #include "base/units.h"
 #include "base/version.h"
+#include "flexel/lammps/imported.h"
 #include "flexel/lammps/input_files.h"
 #include "formats/lattice/body_file.h"
 #include "simulate/contact/pairs/stuck_places.h"
@@ -128,9 +129,13 @@ std::string export_run(Body& body, const simulate::Scene& scene, const ExportNam
       stem(names.script)));
   body.position = particles.position;
   const auto file = [](const std::string& path) { return stem(path) + "." + extension(path); };
-  write_data(particles, types, fmt::format("LAMMPS data by flexel {}", version()), names.data);
+  const std::uint64_t data =
+      write_data(particles, types, fmt::format("LAMMPS data by flexel {}", version()), names.data);
+  InputNames inside{file(names.data), file(names.dump), ""};
+  inside.run = run_name(data, input_script(particles, types, head, inside));
+  body.notes[kRunNote] = inside.run;
   write_body(body, names.body);
-  write_text(input_script(particles, types, head, {file(names.data), file(names.dump)}), names.script);
+  write_text(input_script(particles, types, head, inside), names.script);
   return summary(particles, types, names, warnings);
 }
 

@@ -48,6 +48,23 @@ Body read_start(const std::string& path) {
   return body;
 }
 
+// Of the first frame. Throws InputError: it is of another run.
+std::vector<std::string> first_warnings(const lammps::DumpFrame& frame, const lammps::DumpReader& dump,
+                                        const Body& body, const ImportArguments& arguments) {
+  std::vector<std::string> warnings;
+  const std::string unsure = lammps::unsure_origin(dump.run(), body, arguments.dump);
+  if (!unsure.empty()) warnings.push_back(unsure);
+  if (frame.step == 0)
+    refuse_other_start(frame, body, arguments.dump);
+  else if (dump.run().empty() || !unsure.empty())
+    warnings.push_back(
+        fmt::format("its first frame is of step {}, so whether it began as {} is cannot be told", frame.step,
+                    arguments.body));
+  if (frame.velocity.empty())
+    warnings.push_back("has no vx vy vz: a run that goes on from its bodies begins at rest");
+  return warnings;
+}
+
 }  // namespace
 
 int import_lammps_command(int argc, char** argv) {
@@ -69,14 +86,9 @@ int import_lammps_command(int argc, char** argv) {
   std::optional<std::uint64_t> folded;  // the first step whose matter is inside out
   std::optional<double> time;
   while (const std::optional<lammps::DumpFrame> frame = dump.next()) {
-    if (frames == 0 && frame->step == 0) refuse_other_start(*frame, body, arguments.dump);
-    if (frames == 0 && frame->step != 0)
-      progress.warn(
-          fmt::format("{}: its first frame is of step {}, so whether it began as {} is cannot be told",
-                      arguments.dump, frame->step, arguments.body));
-    if (frames == 0 && frame->velocity.empty())
-      progress.warn(fmt::format("{}: has no vx vy vz: a run that goes on from its bodies begins at rest",
-                                arguments.dump));
+    if (frames == 0)
+      for (const std::string& each : first_warnings(*frame, dump, body, arguments))
+        progress.warn(fmt::format("{}: {}", arguments.dump, each));
     if (series && (!frame->time || (time && !(*frame->time > *time))))
       throw InputError(arguments.dump, fmt::format("the frame of step {} {}", frame->step,
                                                    frame->time ? "is not later than the one before it"

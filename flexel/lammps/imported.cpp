@@ -52,6 +52,23 @@ double smallest_volume(const Body& body, const Part& part) {
 
 }  // namespace
 
+std::string unsure_origin(const std::string& run, const Body& body, const std::string& where) {
+  const auto note = body.notes.find(kRunNote);
+  const std::string wanted = note == body.notes.end() ? "" : note->second;
+  if (run == wanted) return "";
+  if (run.empty())
+    return fmt::format("has no column {}, as the script has it: whether it is of this run cannot be told",
+                       wanted);
+  if (wanted.empty())
+    return "is of a run that flexel export wrote, and the body is not the one beside that script: whether it "
+           "is of "
+           "this run cannot be told";
+  throw InputError(
+      where,
+      "the dump is of another run: give the body that flexel export wrote beside its script, or run "
+      "LAMMPS again after an export");
+}
+
 void refuse_other_start(const DumpFrame& frame, const Body& body, const std::string& where) {
   double spacing = body.parts.front().lattice.spacing.minCoeff();
   for (const Part& part : body.parts) spacing = std::min(spacing, part.lattice.spacing.minCoeff());
@@ -66,6 +83,7 @@ void refuse_other_start(const DumpFrame& frame, const Body& body, const std::str
 
 void take_frame(const DumpFrame& frame, Body& body) {
   body.position = frame.position;
+  body.notes.erase(kRunNote);  // what goes on from here is another run
   body.element_columns.erase("velocity");
   if (frame.velocity.empty()) return;
   Column velocity;

@@ -7,6 +7,12 @@
 
 namespace flexel::lammps {
 
+constexpr const char* kRunNote = "lammps";  // of a body that goes to LAMMPS: run_name()
+
+// For people, what cannot be told of where a dump comes from, by its name of the run and the body's note; "" where
+// nothing is open. Throws InputError(where, ...) where the dump is of another run.
+[[nodiscard]] std::string unsure_origin(const std::string& run, const Body& body, const std::string& where);
+
 // Throws InputError(where, ...) where the frame is the start of another run than that of `body`.
 void refuse_other_start(const DumpFrame& frame, const Body& body, const std::string& where);
 

@@ -20,6 +20,12 @@ namespace {
 constexpr std::size_t kPiece = std::size_t{1} << 20;  // bytes that are written at a time
 constexpr const char* kAxes = "xyz";
 
+// FNV-1a.
+std::uint64_t hashed(std::uint64_t hash, const std::string& text) {
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
+  return hash;
+}
+
 // Text that goes to the file as it grows.
 class DataText {
  public:
@@ -29,17 +35,24 @@ class DataText {
     append_text(text_, format, std::forward<T>(values)...);
     if (text_.size() < kPiece) return;
     check_stop();
-    file_.write(text_);
-    text_.clear();
+    flush();
   }
-  void commit() {
-    file_.write(text_);
+  // Returns a hash of the text.
+  std::uint64_t commit() {
+    flush();
     file_.commit();
+    return hash_;
   }
 
  private:
+  void flush() {
+    hash_ = hashed(hash_, text_);
+    file_.write(text_);
+    text_.clear();
+  }
   OutputFile file_;
   std::string text_;
+  std::uint64_t hash_ = 0xcbf29ce484222325U;
 };
 
 bool turns(const Particles& particles) {
@@ -233,7 +246,9 @@ class Script {
   void running(const InputNames& names) {
     const auto frames = particles_.frames, steps = particles_.steps;
     line("variable frame equal ceil((floor(step*{}/{})+1)*{}/{})", frames, steps, steps, frames);
-    line("dump frames all custom {} \"{}\" id x y z vx vy vz", steps, names.dump);
+    if (!names.run.empty()) line("variable {} atom 0", names.run.substr(2));
+    line("dump frames all custom {} \"{}\" id x y z vx vy vz{}{}", steps, names.dump,
+         names.run.empty() ? "" : " ", names.run);
     line("dump_modify frames sort id format float %.17g first yes time yes every v_frame");
     line("thermo_style custom step time ke pe\nthermo_modify norm no\nthermo {}",
          std::max<std::uint64_t>(1, steps / 10));
@@ -331,8 +346,8 @@ BondTypes bond_types(const std::vector<Spring>& springs) {
   return found;
 }
 
-void write_data(const Particles& particles, const BondTypes& types, const std::string& head,
-                const std::string& path) {
+std::uint64_t write_data(const Particles& particles, const BondTypes& types, const std::string& head,
+                         const std::string& path) {
   DataText text(path);
   text.add("{}\n\n{} atoms\n{} atom types\n{} bonds\n{} bond types\n", head, particles.mass.size(),
            2 * support_types(particles), particles.springs.size(), types.types.size());
@@ -359,7 +374,11 @@ void write_data(const Particles& particles, const BondTypes& types, const std::s
   for (std::size_t b = 0; b < particles.springs.size(); ++b)
     text.add("{} {} {} {}\n", b + 1, types.of[b] + 1, particles.springs[b].a + 1, particles.springs[b].b + 1);
   write_elements(particles, text);
-  text.commit();
+  return text.commit();
+}
+
+std::string run_name(std::uint64_t data, const std::string& script) {
+  return fmt::format("{}{:016x}", kRunPrefix, hashed(data, script));
 }
 
 std::string input_script(const Particles& particles, const BondTypes& types,

@@ -10,6 +10,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <tuple>
 
 #include "base/parallel.h"
@@ -48,22 +49,25 @@ std::vector<Drag::Face> Drag::faces(const Problem& problem) {
   for (std::uint32_t p = 0; p < problem.body.surface.polygon_count(); ++p)
     if (problem.body.parts[problem.body.surface.polygon_part(p)].placement == Placement::corner)
       polygons.push_back(p);
-  std::vector<SurfacePoint> points = surface_points(problem, polygons);
-  const auto key = [](const SurfacePoint& point) { return std::tie(point.polygon, point.at.elements); };
-  std::stable_sort(points.begin(), points.end(),
-                   [&](const SurfacePoint& a, const SurfacePoint& b) { return key(a) < key(b); });
+  const std::vector<SurfacePoint> points = surface_points(problem, polygons);
+  std::vector<std::uint32_t> order(points.size());  // of numbers: a point has 160 bytes
+  std::iota(order.begin(), order.end(), 0U);
+  const auto key = [&](std::uint32_t p) { return std::tie(points[p].polygon, points[p].at.elements); };
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
   std::vector<Face> faces;
-  for (std::size_t i = 0; i < points.size();) {
+  for (std::size_t i = 0; i < order.size();) {
     Face face;
-    face.elements = points[i].at.elements;
-    face.part = problem.body.surface.polygon_part(points[i].polygon);
+    face.elements = points[order[i]].at.elements;
+    face.part = problem.body.surface.polygon_part(points[order[i]].polygon);
     double area = 0;
     std::size_t end = i;
-    for (; end < points.size() && key(points[end]) == key(points[i]); ++end) {
-      const double each = points[end].area_vector.norm();
-      face.area += points[end].area_vector;
+    for (; end < order.size() && key(order[end]) == key(order[i]); ++end) {
+      const SurfacePoint& point = points[order[end]];
+      const double each = point.area_vector.norm();
+      face.area += point.area_vector;
       area += each;
-      for (std::size_t a = 0; a < 8; ++a) face.weights[a] += each * points[end].at.weights[a];
+      for (std::size_t a = 0; a < 8; ++a) face.weights[a] += each * point.at.weights[a];
     }
     for (double& weight : face.weights) weight /= area;
     if (face.area.norm() > 0) faces.push_back(face);

@@ -117,6 +117,13 @@ void refuse_unfit(const Indenter& indenter, const Problem& problem) {
   if (const double spacing = smallest_spacing(problem.body); indenter.shape.radius < spacing)
     refuse(fmt::format("has a radius of {}, less than a cell of {}: use a smaller spacing (--size)",
                        human_length(indenter.shape.radius), human_length(spacing)));
+  // Depths are differences of the radius and a distance: at 10^6 cells the least that counts is a hundredth wrong.
+  constexpr double kMostCells = 1e6;
+  if (const double most = kMostCells * smallest_spacing(problem.body); indenter.shape.radius > most)
+    refuse(fmt::format(
+        "has a radius of {}, more than a million cells ({}): check the unit, or give a plate that is "
+        "little wider than the part",
+        human_length(indenter.shape.radius), human_length(most)));
   // Deeper than its rounding a plate pushes along its normal all at once, and a solution is a hundredth of a cell deep.
   constexpr double kLeastRounding = 0.1;  // cells
   if (const double least = kLeastRounding * smallest_spacing(problem.body); indenter.shape.rounding < least)
@@ -209,17 +216,21 @@ std::optional<Indenters> Indenters::make(const Parameters& parameters, const Pro
   Indenters made;
   made.body_ = &problem.body;
   made.indenters_ = parameters.indenters;
-  std::vector<SurfacePoint> points = all_surface_points(problem);
+  const std::vector<SurfacePoint> points = all_surface_points(problem);
   for (const Indenter& indenter : made.indenters_) refuse_start(indenter, points, problem);
-  made.add_points(std::move(points), problem);
+  made.add_points(points, problem);
   return made;
 }
 
-void Indenters::add_points(std::vector<SurfacePoint> points, const Problem& problem) {
-  std::stable_sort(points.begin(), points.end(), [](const SurfacePoint& a, const SurfacePoint& b) {
-    return a.at.elements < b.at.elements;
+void Indenters::add_points(const std::vector<SurfacePoint>& points, const Problem& problem) {
+  std::vector<std::uint32_t> order(points.size());  // of numbers: a point has 160 bytes
+  std::iota(order.begin(), order.end(), 0U);
+  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return points[a].at.elements < points[b].at.elements;
   });
-  for (const SurfacePoint& point : points) {
+  points_.reserve(points.size());
+  for (const std::uint32_t next : order) {
+    const SurfacePoint& point = points[next];
     const std::uint32_t part = problem.body.surface.polygon_part(point.polygon);
     const double spacing = problem.body.parts[part].lattice.spacing.mean();
     if (patches_.empty() || patches_.back().elements != point.at.elements) {

@@ -84,7 +84,7 @@ class Indenters : public Effect {
     double spread = 1;                 // the largest sum of the absolute values of a point's weights
     double spacing = 0;                // m
   };
-  void add_points(std::vector<SurfacePoint> points, const Problem& problem);
+  void add_points(const std::vector<SurfacePoint>& points, const Problem& problem);
   [[nodiscard]] std::array<Vec3, 8> corners(const Patch& patch, const std::vector<Vec3>& displacement) const;
   // each(patch, point, gap, position) of all points that are inside, in their order.
   template <class Each>

@@ -139,25 +139,33 @@ class Gathered {
   std::size_t last_ = 0;
 };
 
-std::vector<SurfacePoint> points_of(const Problem& problem, const std::vector<Share>& shares) {
-  const auto for_each_piece_of = [&](std::size_t s, const auto& each) {
-    for_each_piece(shares[s].corners, longest_edge(problem.body, shares[s].polygon), each);
-  };
-  // There are some fifty points to a cell under a large face: they are counted first, so that no second copy
-  // is needed.
+// The first of each share's points, and the number of all.
+std::vector<std::size_t> begins_of(const Body& body, const std::vector<Share>& shares) {
   std::vector<std::size_t> begin(shares.size() + 1, 0);
   parallel_for_each(
-      shares.size(), [&](std::size_t s) { for_each_piece_of(s, [&](const Corners&) { ++begin[s + 1]; }); },
+      shares.size(),
+      [&](std::size_t s) {
+        for_each_piece(shares[s].corners, longest_edge(body, shares[s].polygon),
+                       [&](const Corners&) { ++begin[s + 1]; });
+      },
       16);
   std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  return begin;
+}
+
+std::vector<SurfacePoint> points_of(const Problem& problem, const std::vector<Share>& shares) {
+  // There are some fifty points to a cell under a large face: they are counted first, so that no second copy
+  // is needed.
+  const std::vector<std::size_t> begin = begins_of(problem.body, shares);
   std::vector<SurfacePoint> points(begin.back());
   parallel_for_each(
       shares.size(),
       [&](std::size_t s) {
         std::size_t next = begin[s];
         SurfaceCarriers carriers(problem, shares[s].polygon);
-        for_each_piece_of(
-            s, [&](const Corners& piece) { points[next++] = point_of(carriers, shares[s].polygon, piece); });
+        for_each_piece(
+            shares[s].corners, longest_edge(problem.body, shares[s].polygon),
+            [&](const Corners& piece) { points[next++] = point_of(carriers, shares[s].polygon, piece); });
       },
       16);
   std::erase_if(points,
@@ -194,6 +202,18 @@ std::vector<SurfacePoint> gathered_surface_points(const Problem& problem,
   for (const std::vector<SurfacePoint>& share : gathered)
     points.insert(points.end(), share.begin(), share.end());
   return points;
+}
+
+std::vector<std::size_t> surface_point_counts(const Body& body) {
+  const Triangles triangles = triangulate(body.surface);
+  std::vector<std::uint32_t> all(triangles.polygon.size());
+  std::iota(all.begin(), all.end(), 0U);
+  const std::vector<Share> shares = shares_of(body, triangles, all);
+  const std::vector<std::size_t> begin = begins_of(body, shares);
+  std::vector<std::size_t> counts(body.parts.size(), 0);
+  for (std::size_t s = 0; s < shares.size(); ++s)
+    counts[body.surface.polygon_part(shares[s].polygon)] += begin[s + 1] - begin[s];
+  return counts;
 }
 
 double total_area(const std::vector<SurfacePoint>& points) {

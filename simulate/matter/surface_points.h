@@ -30,6 +30,9 @@ struct SurfacePoint {
 [[nodiscard]] std::vector<SurfacePoint> gathered_surface_points(const Problem& problem,
                                                                 const std::vector<std::uint32_t>& polygons);
 
+// How many points the surface of each part has, (parts), those that nothing carries among them: for what they will take.
+[[nodiscard]] std::vector<std::size_t> surface_point_counts(const Body& body);
+
 [[nodiscard]] double total_area(const std::vector<SurfacePoint>& points);
 
 }  // namespace flexel::simulate

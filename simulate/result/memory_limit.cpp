@@ -17,8 +17,9 @@ namespace {
 constexpr double kSure = 1.3;             // what the estimate may be off by
 constexpr double kProgramAndBody = 15e6;  // bytes
 // Of model `quadratic`, bytes: whole cells share one matrix until they turn with their matter; cells that the surface
-// cuts have one each, and a factor of it, and so have those that are held.
-constexpr double kQuadraticNode = 1250, kCutCell = 24e3, kHeldCell = 79e3, kTurnedCell = 11e3;
+// cuts have one each, and a factor of it, and so have those that are held. Of whole cells that have turned by over .02 rad
+// all are in memory at once while a preconditioner is made.
+constexpr double kQuadraticNode = 1250, kCutCell = 24e3, kHeldCell = 79e3, kTurnedCell = 28e3;
 
 }  // namespace
 

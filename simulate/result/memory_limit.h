@@ -11,7 +11,8 @@ namespace flexel::simulate {
 // (tests/programs/limits_test.py).
 struct MemoryNeeded {
   double bytes = 0;
-  double with_large_deflections = 0;  // the same, but in model `quadratic`, where cells that turn take more
+  double with_large_deflections =
+      0;  // the same, but in model `quadratic`, where cells that turn take more: up to this
 };
 
 // Of model `quadratic` with `held` cells that supports or bonds hold.

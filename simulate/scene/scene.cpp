@@ -55,6 +55,8 @@ Material parse_material(TableReader& reader, const std::string& name) {
   material.hardening = reader.quantity("hardening", Dimension::pressure).value_or(0);
   material.strength = optional_limit("strength");
   material.layer_strength = optional_limit("layer_strength");
+  if (material.layer_strength > 0 && !(material.yield > 0) && !(material.strength > 0))
+    reader.fail("\"layer_strength\" needs \"strength\" or \"yield\" beside it, along the layers");
   material.elongation = reader.number("elongation").value_or(0);
   parse_uniform_elongation(reader, material);
   material.contact_friction = reader.number("friction");

@@ -19,6 +19,17 @@ std::uint32_t most_stressed(const Part& part, const std::vector<double>& stress)
   return most;
 }
 
+// Pa: what it bears, and whether it yields there. A material may break before it yields.
+std::pair<double, bool> limit_of(const Material& material) {
+  const bool breaks = material.strength > 0 && !(material.yield > 0 && material.yield <= material.strength);
+  return {breaks ? material.strength : material.yield, !breaks};
+}
+
+// Along the layers or across them.
+double nearest_share(const StrengthSummary& of) {
+  return std::max(of.share, of.layer_share.value_or(0));
+}
+
 }  // namespace
 
 bool has_edited_limits(const Body& body, const Part& part) {
@@ -46,7 +57,7 @@ std::optional<StrengthSummary> nearest_to_strength(const Body& body, const std::
       unknown.push_back(fmt::format("part \"{}\" of model \"paper\"", part.name));
       continue;
     }
-    const double limit = material.yield > 0 ? material.yield : material.strength;
+    const auto [limit, yields] = limit_of(material);
     // along and across the grain strengths differ many times over: one number says nothing of the nearest
     if (!(limit > 0) || material.law == LawName::orthotropic || has_edited_limits(body, part)) {
       if (std::find(unknown.begin(), unknown.end(), material.name) == unknown.end())
@@ -54,11 +65,10 @@ std::optional<StrengthSummary> nearest_to_strength(const Body& body, const std::
       continue;
     }
     const std::uint32_t most = most_stressed(part, stress);
-    const double share = stress[most] / limit;
-    if (found && share <= found->share) continue;
-    found = StrengthSummary{share,     stress[most], body.rest[most], limit, material.yield > 0,
-                            part.name, material.name};
-    if (material.layer_strength > 0) found->layer_share = stress[most] / material.layer_strength;
+    StrengthSummary here{stress[most] / limit, stress[most], body.rest[most], limit, yields, part.name,
+                         material.name};
+    if (material.layer_strength > 0) here.layer_share = stress[most] / material.layer_strength;
+    if (!found || nearest_share(here) > nearest_share(*found)) found = here;
   }
   return found;
 }

@@ -26,7 +26,7 @@ struct StrengthSummary {   // of the part that is nearest to what its material b
 [[nodiscard]] bool has_edited_limits(const Body& body, const Part& part);
 
 // The part whose largest von Mises stress (column "von_mises" of the elements) is the greatest share of its
-// material's yield stress, or of its strength where no yield stress is known. Nothing where no part has
+// material's yield stress or strength, whichever is less, or of what a print bears across its layers. Nothing where no part has
 // either, or no stresses. `materials` (parts). `unknown` gets the names of materials that have neither, of those
 // of parts with edited limits, and of parts of model `paper`, which has no stresses.
 [[nodiscard]] std::optional<StrengthSummary> nearest_to_strength(const Body& body,

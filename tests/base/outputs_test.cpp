@@ -75,6 +75,8 @@ TEST(Outputs, NamesOfManyFilesKeepInputs) {
   std::filesystem::create_hard_link(other, scratch.path("b_1.vtu"));
   EXPECT_TRUE(refused("b.pvd", other));
   EXPECT_TRUE(refused("b.pvd", scratch.path("./b_1.vtu")));
+  std::filesystem::create_symlink("a[1]*_00012.vtu", scratch.path("c_00000.vtu"));
+  EXPECT_TRUE(refused("c.pvd", frame));
 }
 
 TEST(Outputs, AppearTogetherOrNotAtAll) {

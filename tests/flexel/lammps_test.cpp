@@ -266,6 +266,18 @@ TEST(Lammps, WhatIsWrongWithADumpIsToldWithItsLine) {
     refused((good + later).substr(0, cut), "run.dump", "remove line 14 and those behind it");
   refused("ITEM: UNITS\nlj\n", "run.dump:2", "units lj");
   refused("ITEM: TIMESTEP\n-1\n", "run.dump:2", "whole number");
+  refused("ITEM: TIMESTEP\n99999999999999999999\n", "run.dump:2", "whole number");
+  refused("ITEM: TIMESTEP\n0\nITEM: TIMESTEP\n1\n", "run.dump:3", "twice in one frame");
+  refused(std::string(kAtoms) + "1 1 2 3 4 5 6\n2 1 2 3 4 5 6\n", "run.dump:1", "no \"ITEM: TIMESTEP\"");
+  refused(std::string("ITEM: TIMESTEP\n0\n") + kAtoms, "run.dump:3", "no \"ITEM: NUMBER OF ATOMS\"");
+  refused(kHead + "ITEM: ATOMSid x y z\n", "run.dump:11", "no line \"ITEM: ...\"");
+  refused(atoms + "1 1 2 3e12 4 5 6\n", "run.dump:12", "shorter step");
+  refused(atoms + "1 1 2 3 4 5 6e35\n", "run.dump:12", "shorter step");
+  const auto of_run = [](int step, const char* run) {
+    return head_of(step) + "ITEM: ATOMS id x y z v_flexel" + run + "\n1 1 2 3 0\n2 1 2 3 0\n";
+  };
+  EXPECT_EQ(read_with(of_run(1, "0a") + of_run(2, "0a")), "read");
+  refused(of_run(1, "0a") + of_run(2, "0b"), "run.dump:24", "another run");
 }
 
 TEST(Lammps, MatterThatIsInsideOutIsSeen) {

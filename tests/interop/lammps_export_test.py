@@ -270,5 +270,49 @@ def test_dumps_of_another_run_are_refused():
     expect(folded.code == 0 and "step 7" in folded.err and "inside out" in folded.err, f"{folded}")
 
 
+def test_a_dump_of_another_scene_on_the_same_lattice_is_refused():
+    need("lmp")
+    lattice(size="20 mm")
+    flung = '[[velocity]]\nwhere = { half_space = { point = [0, 0, 0], normal = [-1, 0, 0] } }\nvelocity = ["SPEED m/s", 0, 0]\n'
+    scenes = [MATTER.replace("MODEL", "springs") + flung.replace("SPEED", str(speed)) + '[run]\ntime = "0.1 ms"\nstep = "10 us"\nframes = 2\n' for speed in (1, 2)]
+    def export(number):
+        scene("scene.toml", scenes[number])
+        expect_ok(run("flexel", "export", "rest.vtu", "--scene", "scene.toml", "--lammps", "-o", "run.in"))
+    take = lambda dump, out: run("flexel", "import-lammps", dump, "run.vtu", "-o", out)
+    export(0)
+    run_lammps("run.in", 1)
+    export(1)
+    expect_error(take("run.dump", "end.vtu"), "flexel", "run.dump", "another run", "again after an export")
+    export(0)
+    ended = expect_ok(take("run.dump", "end.vtu"))
+    expect("cannot be told" not in ended.err, f"{ended}")
+    dump = pathlib.Path("run.dump").read_text(encoding="utf-8")
+    head = next(line for line in dump.splitlines() if line.startswith("ITEM: ATOMS"))
+    write("bare.dump", "\n".join(line if line.startswith("ITEM: ") or len(line.split()) < 8 else line.rsplit(" ", 1)[0]
+                                 for line in dump.replace(head, head.rsplit(" ", 1)[0]).splitlines()) + "\n")
+    ended = expect_ok(take("bare.dump", "bare.vtu"))
+    expect("no column v_flexel" in ended.err and "cannot be told" in ended.err, f"{ended}")
+    ended = expect_ok(run("flexel", "import-lammps", "run.dump", "rest.vtu", "-o", "other.vtu"))
+    expect("not the one beside that script" in ended.err, f"{ended}")
+    expect("v_flexel" not in pathlib.Path("end.vtu").read_text(encoding="latin-1"), "what goes on from here is another run")
+
+
+def test_a_series_does_not_replace_its_inputs():
+    """By the names of its frames, a link's too; flexel-simulate as well."""
+    body("rest.vtu")
+    positions = vtu_arrays("rest.vtu")["points/position"]
+    write("run.dump", DUMP.format(0, len(positions)).replace("ITEM: TIMESTEP", "ITEM: TIME\n0\nITEM: TIMESTEP") +
+          "".join(f"{n} {x!r} {y!r} {z!r}\n" for n, (x, y, z) in enumerate(positions.tolist(), 1)))
+    os.rename("rest.vtu", "run_00000.vtu")
+    os.symlink("run_00000.vtu", "link_00007.vtu")
+    scene("scene.toml", 'material = "rubber"\n[run]\ntime = "0.1 ms"\nframes = 1\n')
+    for command in (["flexel", "import-lammps", "run.dump", "run_00000.vtu"], ["flexel-simulate", "scene.toml", "run_00000.vtu"]):
+        for series in ("run.pvd", "link.pvd"):
+            expect_error(run(*command, "-o", series), command[0], series, "run_00000.vtu", "--force")
+        expect_ok(run(*command, "-o", "ru.pvd"))
+    expect((vtu_arrays("run_00000.vtu")["points/position"] == positions).all(), "the body was replaced")
+    expect_ok(run("flexel", "import-lammps", "run.dump", "run_00000.vtu", "--force", "-o", "run.pvd"))
+
+
 if __name__ == "__main__":
     main(globals())

@@ -191,6 +191,35 @@ TEST(EventsAtRest, SharesOfTheMaterialsYieldAreNotToldOfEditedParts) {
     EXPECT_FALSE(share(std::string("[[event]]\ndo = \"edit\"\n") + what + " = 0.5\n").has_value()) << what;
 }
 
+// A material that breaks before it yields, and two parts of which one is nearer to its limit across its layers.
+TEST(Strength, TheLeastLimitCounts) {
+  Body body = resting_bar();
+  body.element_columns["von_mises"] = {1, std::vector<double>(body.element_count(), 2e3)};
+  std::vector<std::string> unknown;
+  const auto told = [&](double yield, double strength, double across) {
+    Material gum{"gum", 1e6, 0.3, 1000, "", yield};
+    gum.strength = strength;
+    gum.layer_strength = across;
+    return nearest_to_strength(body, std::vector<Material>(body.parts.size(), gum), unknown).value();
+  };
+  EXPECT_EQ(told(1e4, 1e3, 0).share, 2);
+  EXPECT_FALSE(told(1e4, 1e3, 0).yields);
+  EXPECT_EQ(told(1e3, 1e4, 0).share, 2);
+  EXPECT_TRUE(told(1e3, 1e4, 0).yields);
+  EXPECT_EQ(told(1e3, 0, 0).share, 2);
+  EXPECT_EQ(told(0, 1e3, 0).share, 2);
+  Part other = body.parts[0];
+  other.name = "other";
+  const std::uint32_t half = other.element_end / 2;
+  body.parts[0].element_end = other.element_begin = half;
+  body.parts.push_back(other);
+  std::vector<Material> materials(2, {"gum", 1e6, 0.3, 1000, "", 1e4});
+  materials[1].layer_strength = 1e3;
+  EXPECT_EQ(nearest_to_strength(body, materials, unknown)->part, "other");
+  std::swap(materials[0], materials[1]);
+  EXPECT_EQ(nearest_to_strength(body, materials, unknown)->part, body.parts[0].name);
+}
+
 // Before anything is written into its columns.
 TEST(EventsAtRest, ADamagedBodyIsNotAdded) {
   const flexel::test::Scratch scratch;

@@ -407,6 +407,8 @@ TEST(Indenters, WhatCannotBeIsRefused) {
               HasSubstr("begins inside part \"box\""));
   EXPECT_THAT(why(kOnTheGround + ball(Vec3(0.02, 0.02, 0.026), 0.005, Vec3::Zero())),
               HasSubstr("less than a cell"));
+  EXPECT_THAT(why(kOnTheGround + ball(Vec3(0.02, 0.02, 2e4), 1e4 + 1, Vec3::Zero())),
+              HasSubstr("more than a million cells"));
   EXPECT_THAT(why(kOnTheGround + ball(Vec3(0.02, 0.02, 0.032), 0.012, Vec3(0, 0, -1e10))),
               HasSubstr("takes more than 10,000 of them"));
   EXPECT_THAT(why(kOnTheGround + "[[indenter]]\nplate = { centre = [0, 0, \"30 mm\"], normal = [0, 0, -1], "

@@ -71,6 +71,7 @@ void add_faces(const Problem& problem, std::uint32_t part, const std::vector<Sur
   std::vector<ContactPoint> faces;
   const Lattice& lattice = problem.body.parts[part].lattice;
   std::vector<Piece> pieces;
+  pieces.reserve(surface.size());
   for (const SurfacePoint& point : surface) {
     if (!(point.area_vector.squaredNorm() > 0)) continue;
     const Vec3 at = lattice.to_lattice(point.position);
