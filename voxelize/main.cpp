@@ -1,6 +1,7 @@
 // flexel-voxelize: parts in, body out.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <malloc.h>
 
 #include <cmath>
 #include <optional>
@@ -164,6 +165,10 @@ void check_files(const Arguments& arguments) {
 // Makes and writes the pieces, one after another, and their list.
 VoxelizeResult write_pieces(Surface surface, const VoxelizeOptions& options, const Arguments& arguments,
                             Progress& progress) {
+#ifdef __GLIBC__
+  // The library would raise its bound with what is freed, and keep the memory of one piece, in holes, beside the next.
+  mallopt(M_MMAP_THRESHOLD, 1024 * 1024);
+#endif
   std::optional<SurfaceBeside> beside;
   std::vector<vtu::HeadArray> arrays;
   std::uint64_t run = 0;
