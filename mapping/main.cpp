@@ -191,7 +191,7 @@ Plan make_plan(Arguments& arguments, const CommandLine& app) {
     throw InputError(
         "--far and --binding are for vertices, which STEP, IGES and BREP do not have: leave them out");
   plan_refinement(arguments, app, plan);
-  std::vector<OutputName> outputs = {{arguments.save_binding, true}, {plan.crack.pieces}};
+  std::vector<OutputName> outputs = {{arguments.save_binding, true}};
   if (!plan.series) outputs.insert(outputs.end(), {{arguments.map.report}, {arguments.output}});
   if (arguments.json) outputs.push_back({"-"});
   check_outputs(outputs, inputs_of(arguments), arguments.force);
