@@ -159,8 +159,7 @@ void plan_outputs(const DeformArguments& arguments, Plan& plan) {
   if (!arguments.body.empty()) plan.outputs.push_back({arguments.body, std::nullopt});
   std::vector<OutputName> names;
   for (const Plan::Output& output : plan.outputs) names.push_back({output.path});
-  for (const std::string& path :
-       {arguments.map.report, arguments.summary, plan.crack.pieces, failed_name(plan)})
+  for (const std::string& path : {arguments.map.report, arguments.summary, failed_name(plan)})
     names.push_back({path});
   if (arguments.json) names.push_back({"-"});
   std::vector<std::string> inputs = arguments.job.parts;

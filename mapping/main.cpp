@@ -215,7 +215,7 @@ Plan make_plan(Arguments& arguments, const CommandLine& app) {
         "--far and --binding are for vertices, which STEP, IGES and BREP do not have: leave them out");
   check_in_pieces(arguments, plan);
   plan_refinement(arguments, app, plan);
-  std::vector<OutputName> outputs = {{arguments.save_binding, true}, {plan.crack.pieces}};
+  std::vector<OutputName> outputs = {{arguments.save_binding, true}};
   if (!plan.series) outputs.insert(outputs.end(), {{arguments.map.report}, {arguments.output}});
   if (arguments.json) outputs.push_back({"-"});
   check_outputs(outputs, inputs_of(arguments), arguments.force);

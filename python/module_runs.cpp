@@ -191,10 +191,10 @@ py::tuple map_body(const BodyObject& given, const std::vector<std::string>& word
     bool force = false;
     app.add_flag("--force", force, "Let results replace files that are read");
     parse(app, "map", words);
-    const mapping::CrackOptions crack = crack_options(arguments);
-    check_outputs({{path}, {arguments.report}, {crack.pieces}}, inputs, force);
+    check_outputs({{path}, {arguments.report}}, inputs, force);
     if (!force && !path.empty()) mapping::keep_source(given.body, path);
     mapping::MapOptions options = map_options(arguments);
+    const mapping::CrackOptions crack = crack_options(arguments);
     mapping::RefineOptions refine = refine_options(arguments, app, crack);
     std::optional<mapping::MapOutput> output;
     std::vector<SurfaceFormat> formats;

@@ -118,15 +118,19 @@ double StepBound::damping_rate() const {
   return kGrowthAhead * bare_damping_rate();
 }
 
-bool StepBound::outgrows(double rate, const State& state, double step, std::uint64_t steps) {
-  constexpr double kTravel = 0.05, kMostSteps = 16;
+double StepBound::travel(const State& state, double step) const {
   const double fastest = std::sqrt(parallel_sum<Fastest>(state.velocity.size(), [&](std::size_t e) {
                                      return Fastest{state.velocity[e].squaredNorm()};
                                    }).squared);
   double narrowest = std::numeric_limits<double>::infinity();
   for (const Part& part : problem_.body.parts)
     narrowest = std::min(narrowest, part.lattice.spacing.minCoeff());
-  const double allowed = kTravel * narrowest / (step * fastest);
+  return step * fastest / narrowest;
+}
+
+bool StepBound::outgrows(double rate, const State& state, double step, std::uint64_t steps) {
+  constexpr double kTravel = 0.05, kMostSteps = 16;
+  const double allowed = kTravel / travel(state, step);
   const auto every = static_cast<std::uint64_t>(std::clamp(allowed, 1.0, kMostSteps));
   if (steps % every != 0) return false;
   growth_ = damping_growth(problem_, state.displacement, cells_);

@@ -28,6 +28,8 @@ class StepBound {
   // Whether `rate` bounds them in `state` no more. Looks at the cells only where they may have changed: every so many
   // steps that nothing has moved by a twentieth of a spacing since, at its speed.
   [[nodiscard]] bool outgrows(double rate, const State& state, double step, std::uint64_t steps);
+  // How far the fastest element goes in `step` [s], in the smallest spacing of the body.
+  [[nodiscard]] double travel(const State& state, double step) const;
 
  private:
   [[nodiscard]] double bare_damping_rate() const;

@@ -254,6 +254,11 @@ void TimeSegment::renew_damping(Clock& clock) {
     clock.damping_rate = bound_->damping_rate();
 }
 
+bool TimeSegment::is_fast(const Clock& clock, int steps) const {
+  constexpr double kFast = 0.25;
+  return bound_->travel(state_, steps * clock.step) >= kFast;
+}
+
 bool TimeSegment::needs_step_recheck() const {
   if (guard_ && guard_->needs_step_recheck()) return true;
   return std::any_of(effects_.begin(), effects_.end(),

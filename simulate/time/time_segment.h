@@ -65,6 +65,8 @@ class TimeSegment {
   void renew_damping(Clock& clock);
   // Whether an effect cannot wait for the next look.
   [[nodiscard]] bool needs_step_recheck() const;
+  // Whether cells may change much within `steps`: something goes by a quarter of the smallest spacing or more.
+  [[nodiscard]] bool is_fast(const Clock& clock, int steps) const;
   // One step. With `history` its books, and a row of them where `row`. Throws DivergedError.
   void step(Clock& clock, EnergyHistory* history, bool row);
   // What the next steps depend on besides state() and the clock; only where renews() says so.

@@ -1,5 +1,5 @@
-// The loop over steps. Every kCheck steps the bound on the step is taken anew and the state kept as the last
-// good one; frames, books, events and what happens when a run fails are seen to here.
+// The loop over steps. Every kCheck steps, in a fast motion every kFastCheck, the bound on the step is taken anew and the
+// state kept as the last good one; frames, books, events and what happens when a run fails are seen to here.
 #include "simulate/time/timed_run.h"
 
 #include <fmt/format.h>
@@ -43,7 +43,8 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr int kCheck = 100;          // steps between checks; implicit ones are checked one by one
+constexpr int kCheck = 100;  // steps between checks; implicit ones are checked one by one
+constexpr int kFastCheck = 25;
 constexpr std::size_t kRows = 1000;  // of the history, unless the scene says otherwise
 constexpr std::size_t kFrames = 50;  // likewise
 constexpr double kSameTime = 1e-12;  // share of a time
@@ -349,9 +350,14 @@ void TimedRun::play_until(double end, bool resumed) {
   sound_.keep(segment_->state());
   if (!history_ && !relaxation_) segment_->spare_mass();
   segment_->unload();
-  const std::uint64_t between = segment_->is_implicit() ? 1 : kCheck;
+  const bool implicit = segment_->is_implicit();
+  // of state and clock alone: a run that is resumed checks at the same steps
+  const auto is_due = [&] {
+    return implicit || clock_.steps % kCheck == 0 ||
+           (clock_.steps % kFastCheck == 0 && segment_->is_fast(clock_, kCheck));
+  };
   while (goes_on()) {
-    if (clock_.steps % between == 0 || segment_->needs_step_recheck() || stop_is_due()) check();
+    if (is_due() || segment_->needs_step_recheck() || stop_is_due()) check();
     segment_->renew_damping(clock_);
     step();
     if (has_frames() && *segment_->state().time >= next_frame_ * (1 - 1e-9)) write_frame();

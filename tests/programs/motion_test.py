@@ -273,5 +273,17 @@ def test_a_spin_beyond_all_steps_is_refused():
     expect_error(run("flexel-simulate", "scene.toml", "bar.vtu", "-o", "out.vtu", timeout=30), "flexel-simulate", "spins at", code=3)
 
 
+def test_a_fast_impact_has_a_step_of_its_own():
+    """A bar of aluminium flies at a wall at 410 m/s: its foot is squeezed within some steps, and the bound on them follows."""
+    pathlib.Path("part.stl").write_bytes(binary_stl(box_triangles((3.0, 3.0, 12.0))))
+    expect_ok(run("flexel-voxelize", "part.stl", "--size", "0.75 mm", "--quiet", "-o", "bar.vtu"))
+    pathlib.Path("fast.toml").write_text(
+        'material = "aluminium 6061"\n[plasticity]\nyield = "385 MPa"\nhardening = "236 MPa"\n'
+        '[[fix]]\nwhere = "xmin"\naxes = "x"\n[[fix]]\nwhere = "ymin"\naxes = "y"\n'
+        '[[plane]]\npoint = ["0 mm", "0 mm", "0 mm"]\nnormal = [0, 0, 1]\n'
+        '[[velocity]]\nwhere = "part"\nvelocity = ["0 m/s", "0 m/s", "-410 m/s"]\n[run]\ntime = "20 us"\n')
+    expect_ok(run("flexel-simulate", "fast.toml", "bar.vtu", "-o", "out.vtu", "--no-stress"))
+
+
 if __name__ == "__main__":
     main(globals())
