@@ -160,7 +160,8 @@ int run(int argc, char** argv, distributed::Leader& leader) {
   Arguments arguments;
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
-  leader.give_options(arguments.petsc, arguments.options.threads);
+  distributed::Session::check_options(arguments.petsc);
+  leader.give_threads(arguments.options.threads);
   lead(arguments, leader);
   return kExitDone;
 }
@@ -168,7 +169,7 @@ int run(int argc, char** argv, distributed::Leader& leader) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const flexel::distributed::Session session(argv);
+  const flexel::distributed::Session session(argc, argv);
   int code = 0;
   if (flexel::distributed::rank() == 0) {
     flexel::distributed::Leader leader;
