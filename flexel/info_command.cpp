@@ -22,6 +22,7 @@
 #include "flexel/commands.h"
 #include "flexel/measure/coordinates.h"
 #include "flexel/measure/face_shape.h"
+#include "flexel/measure/pieces_info.h"
 #include "formats/common/file_formats.h"
 #include "formats/exchange/import_parts.h"
 #include "formats/exchange/size_warning.h"
@@ -331,6 +332,13 @@ void write_thickness(Surface surface, const std::string& path) {
   write_surface(surface, still, surface_format("ply"), unit, path);
 }
 
+int info_of_pieces(const std::string& list, bool json, bool of_parts) {
+  if (of_parts)
+    throw InputError(list, "lists the pieces of a lattice: --words and --thickness are for parts");
+  print(json ? pieces_info(list, true) : printable_lines(pieces_info(list, false)));
+  return kExitDone;
+}
+
 }  // namespace
 
 int info_command(int argc, char** argv) {
@@ -338,7 +346,9 @@ int info_command(int argc, char** argv) {
   std::string unit, edge, thickness;
   bool json = false, words = false, force = false;
   CommandLine app{"What a part is, and what a scene can name in it.", "flexel info"};
-  app.add_option("part", files, read_titles() + " files; -: stdin").required().type_name("PART");
+  app.add_option("part", files, read_titles() + " files, or a list of pieces (.pvtu); -: stdin")
+      .required()
+      .type_name("PART");
   const Option as_json = app.add_flag("--json", json, "As JSON, in SI units (docs/guide/info.md)");
   const Option as_words =
       app.add_flag("--words", words, "The names alone that a scene can use, a line each, for completion")
@@ -356,6 +366,8 @@ int info_command(int argc, char** argv) {
   if (!thickness.empty() && extension(thickness) != "ply")
     throw InputError("--thickness: the file must end in .ply");
   check_outputs({{thickness, true}, {"-"}}, files, force);
+  if (files.size() == 1 && extension(files[0]) == "pvtu")
+    return info_of_pieces(files[0], json, words || !thickness.empty());
   ImportOptions options;
   // Corners on chords would make the circles that are fitted to round faces too small.
   options.largest_edge = std::numeric_limits<double>::infinity();

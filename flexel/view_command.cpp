@@ -90,7 +90,7 @@ view::ViewSubject read_view_subject(const std::string& path, const ImportOptions
   } else if (path == "-" || extension(path) == "vtu") {
     Bytes bytes = read_all(path);
     if (looks_like_body(bytes)) {
-      subject.body = read_body(std::move(bytes), subject.where);
+      subject.body = path == "-" ? read_body(std::move(bytes), subject.where) : read_body(path);
     } else {
       const MemoryFile file(bytes);
       try {

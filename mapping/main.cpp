@@ -19,6 +19,7 @@
 #include "mapping/anchors/other_surfaces.h"
 #include "mapping/binding_file.h"
 #include "mapping/cad_output.h"
+#include "mapping/lattice_pieces.h"
 #include "mapping/map_refined.h"
 #include "mapping/methods/map_surface.h"
 #include "mapping/options.h"
@@ -50,7 +51,8 @@ std::string is_distance(const std::string& text) {
 
 void declare(CommandLine& app, Arguments& arguments) {
   app.add_option("body", arguments.body,
-                 "Body file (.vtu) or series (.pvd); without one, or with -, a body from stdin")
+                 "Body file (.vtu), list of pieces (.pvtu) or series (.pvd); without one, or with -, a body "
+                 "from stdin")
       .type_name("BODY");
   app.add_option("--onto", arguments.onto,
                  fmt::format("Deform this mesh ({}) instead of the body's own", read_titles()))
@@ -97,6 +99,7 @@ struct Plan {
   double unit = 0;                  // of the numbers written, m; 0: that of the surface
   std::optional<double> edge;       // m, longest of the mesh of --onto
   bool series = false;
+  bool in_pieces = false;  // the body is
 };
 
 void check_pieces(const Arguments& arguments, const Plan& plan, bool own_surface) {
@@ -122,6 +125,25 @@ void check_binding(const Arguments& arguments, const Plan& plan) {
   if (arguments.binding.empty() && plan.options.method->file_number < 0)
     throw InputError(fmt::format("--save-binding: {} has no binding to keep: add --method {}",
                                  name_of(plan.options.method), saved_method_names()));
+}
+
+// Of a body in pieces only what lies near its surface is read.
+void check_in_pieces(const Arguments& arguments, const Plan& plan) {
+  const auto refuse = [](bool asked, const std::string& what) {
+    if (asked)
+      throw InputError(what +
+                       ": needs the whole body, and pieces (.pvtu) are read near their surface: voxelize "
+                       "and simulate without --pieces");
+  };
+  if (!plan.in_pieces) return;
+  refuse(!arguments.onto.empty(), "--onto");
+  refuse(!arguments.points.empty(), "--points");
+  refuse(!arguments.binding.empty(), "--binding");
+  refuse(!arguments.save_binding.empty(), "--save-binding");
+  refuse(plan.crack.mode != CrackMode::keep, "--crack");
+  refuse(plan.crack.drop_debris, "--debris");
+  refuse(!arguments.map.pieces.empty(), "--pieces");
+  refuse(plan.output && is_cad(*plan.output), "an output in a CAD format");
 }
 
 // Where triangles cannot be split as the state asks for it, they stay as they are unless the user asked.
@@ -153,6 +175,7 @@ Plan make_plan(Arguments& arguments, const CommandLine& app) {
   plan.options.far_distance = arguments.far_distance;
   plan.unit = arguments.unit.empty() ? 0 : length_unit(arguments.unit);
   plan.series = extension(arguments.body) == "pvd";
+  plan.in_pieces = names_pieces(arguments.body);
   plan.crack = crack_options(arguments.map);
   check_pieces(arguments, plan, !foreign);
   check_binding(arguments, plan);
@@ -186,6 +209,7 @@ Plan make_plan(Arguments& arguments, const CommandLine& app) {
   if (cad && (!arguments.far.empty() || !arguments.binding.empty()))
     throw InputError(
         "--far and --binding are for vertices, which STEP, IGES and BREP do not have: leave them out");
+  check_in_pieces(arguments, plan);
   plan_refinement(arguments, app, plan);
   const std::vector<std::string> inputs = {arguments.body, arguments.onto, arguments.points,
                                            arguments.binding};
@@ -257,12 +281,19 @@ class Run {
     }
   }
 
+  // Of a body of which only a part was read.
+  void whole_volume(const LatticeVolume& volume) { whole_ = volume; }
+
   [[nodiscard]] bool foreign() const { return foreign_ || table_; }
 
   // Says what was found, and writes.
   void finish(const Surface& surface, const Body& body, const MapResult& result, MapReport found,
               const std::string& path) {
     if (split_from_) found.split_from = split_from_;
+    if (whole_) {
+      found.lattice_volume_before = whole_->before;
+      found.lattice_volume_after = whole_->after;
+    }
     if (plan_.output && is_cad(*plan_.output)) found.chord.reset();  // its faces are no triangles
     if (found.split_advice == SplitAdvice::length) found.split_advice = advice_;
     progress_.finish();
@@ -322,6 +353,7 @@ class Run {
   std::optional<Surface> foreign_;
   std::optional<PointTable> table_;
   std::optional<std::size_t> split_from_;  // triangles
+  std::optional<LatticeVolume> whole_;
   SplitAdvice advice_ = SplitAdvice::length;
   double unit_ = 0;
   std::size_t frame_ = 0;
@@ -347,7 +379,14 @@ std::optional<Binding> own_binding(const Arguments& arguments, const Body& body,
 void map_one(const Arguments& arguments, Plan& plan, Progress& progress) {
   Run run(arguments, plan, progress);
   progress.stage("read");
-  Body body = read_body(arguments.body);
+  Body body;
+  if (plan.in_pieces) {
+    NearBody near = read_near_surface(arguments.body);
+    body = std::move(near.body);
+    run.whole_volume(near.volume);
+  } else {
+    body = read_body(arguments.body);
+  }
   if (!arguments.force) keep_source(body, arguments.output);
   run.take_surface(body);
   use_field(body, arguments.map, plan.options);

@@ -1,6 +1,7 @@
 // flexel-voxelize: parts in, body out.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <malloc.h>
 
 #include <cmath>
 #include <optional>
@@ -24,6 +25,7 @@
 #include "formats/exchange/size_warning.h"
 #include "formats/exchange/vdb_file.h"
 #include "formats/lattice/body_file.h"
+#include "formats/pieces/pieces.h"
 #include "voxelize/report.h"
 #include "voxelize/voxelize.h"
 
@@ -36,7 +38,7 @@ struct Arguments {
   std::vector<std::string> parts;
   std::string size, placement = "corner", unit, align = "snap", heal = "auto", material, deflection, edge,
                     format, vdb, summary, output = "-";
-  std::optional<long long> count;
+  std::optional<long long> count, pieces;
   int threads = 0;
   bool moments = false, compress = false, quiet = false, force = false, json = false;
 };
@@ -63,6 +65,10 @@ void declare(CommandLine& app, Arguments& arguments) {
   app.add_option("--input-format,--format", arguments.format,
                  fmt::format("format of the input ({}) instead of what its bytes tell",
                              fmt::join(read_formats(), ", ")));
+  app.add_option(
+      "--pieces", arguments.pieces,
+      "cut the lattice into this many pieces, for flexel-simulate-mpi: a list of them (-o body.pvtu), "
+      "body_0.vtu ... and body_surface.vtu beside it");
   add_threads_option(app, arguments.threads);
   app.add_flag("--compress", arguments.compress, "compress the arrays of the body file");
   app.add_flag("--quiet", arguments.quiet, "say warnings only");
@@ -71,7 +77,8 @@ void declare(CommandLine& app, Arguments& arguments) {
   app.add_option("--summary", arguments.summary,
                  "also write what was found as JSON (docs/reference/voxelize.md)");
   app.add_flag("--json", arguments.json, "print that to stdout; the body needs a file (-o)");
-  app.add_option("-o,--output", arguments.output, "body file (.vtu); - or none: standard output");
+  app.add_option("-o,--output", arguments.output,
+                 "body file (.vtu), or with --pieces their list (.pvtu); - or none: standard output");
 }
 
 // One of `words`; throws InputError with the nearest.
@@ -100,7 +107,22 @@ VoxelizeOptions voxelize_options(const Arguments& arguments) {
   options.heal = heal_choice(arguments.heal);
   options.material = arguments.material;
   options.moments = arguments.moments;
+  options.pieces = static_cast<std::size_t>(arguments.pieces.value_or(0));
   return options;
+}
+
+void check_pieces(const Arguments& arguments) {
+  const bool list = extension(arguments.output) == "pvtu";
+  if (!arguments.pieces) {
+    if (list)
+      throw InputError("-o: a .pvtu is a list of pieces; say how many with --pieces, or write a .vtu");
+    return;
+  }
+  constexpr long long kMost = 1000000;
+  if (*arguments.pieces <= 0 || *arguments.pieces > kMost)
+    throw InputError(fmt::format("--pieces: must be from 1 to {}", kMost));
+  if (!list) throw InputError("--pieces: their list needs a file: -o body.pvtu");
+  if (!arguments.vdb.empty()) throw InputError("--vdb: needs the whole lattice; leave out --pieces");
 }
 
 ImportOptions import_options(const Arguments& arguments) {
@@ -124,19 +146,54 @@ Surface import_all(const Arguments& arguments, const ImportOptions& options, Pro
   return import_parts(files, options, progress);
 }
 
+// Every file of the body.
+std::vector<std::string> body_files(const Arguments& arguments) {
+  std::vector<std::string> files = {arguments.output};
+  if (!arguments.pieces) return files;
+  files.push_back(shared_surface_path(arguments.output));
+  for (long long index = 0; index < *arguments.pieces; ++index)
+    files.push_back(piece_path(arguments.output, static_cast<std::uint32_t>(index)));
+  return files;
+}
+
+void check_files(const Arguments& arguments) {
+  std::vector<OutputName> outputs = {{arguments.vdb, true}, {arguments.summary}, {arguments.json ? "-" : ""}};
+  for (const std::string& file : body_files(arguments)) outputs.push_back({file, true});
+  check_outputs(outputs, arguments.parts, arguments.force);
+}
+
+// Makes and writes the pieces, one after another, and their list.
+VoxelizeResult write_pieces(Surface surface, const VoxelizeOptions& options, const Arguments& arguments,
+                            Progress& progress) {
+#ifdef __GLIBC__
+  // The library would raise its bound with what is freed, and keep the memory of one piece, in holes, beside the next.
+  mallopt(M_MMAP_THRESHOLD, 1024 * 1024);
+#endif
+  std::optional<SurfaceBeside> beside;
+  std::vector<vtu::HeadArray> arrays;
+  std::uint64_t run = 0;
+  const auto use = [&](Body& whole, PieceBody& piece) {
+    if (!beside) beside = write_shared_surface(whole, arguments.output, arguments.compress);
+    arrays = write_piece(piece, arguments.output, *beside, arguments.compress);
+    run = piece.numbers.run;
+  };
+  VoxelizeResult result = voxelize_pieces(std::move(surface), options, use, progress);
+  write_piece_list(arguments.output, run, static_cast<std::uint32_t>(options.pieces), arrays);
+  return result;
+}
+
 int run(int argc, char** argv) {
   CommandLine app("Turns parts into lattices of elements.", kName);
   Arguments arguments;
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
   const StopEndsProcess nothing_is_left;
+  check_pieces(arguments);
   const VoxelizeOptions options = voxelize_options(arguments);
   ImportOptions how = import_options(arguments);
   if (!arguments.vdb.empty() && options.placement != Placement::corner)
     throw InputError("--vdb: centre placement has no cells; use --placement corner");
-  check_outputs(
-      {{arguments.output, true}, {arguments.vdb, true}, {arguments.summary}, {arguments.json ? "-" : ""}},
-      arguments.parts, arguments.force);
+  check_files(arguments);
   const ThreadLimit threads(arguments.threads);
   Progress progress(kName, arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   how.warn = [&](const std::string& line) { progress.warn(line); };
@@ -145,13 +202,17 @@ int run(int argc, char** argv) {
   Surface surface = import_all(arguments, how, progress);
   for (const std::string& line : size_warnings(surface)) progress.warn(line);
   for (const std::string& line : refinement_notes(surface)) progress.say(line);
-  const VoxelizeResult result = voxelize(std::move(surface), options, progress);
+  std::vector<std::string> files = body_files(arguments);
+  files.insert(files.end(), {arguments.vdb, arguments.summary});
+  OutputsTogether outputs(files);
+  const VoxelizeResult result = options.pieces > 0
+                                    ? write_pieces(std::move(surface), options, arguments, progress)
+                                    : voxelize(std::move(surface), options, progress);
   report(result, progress);
   progress.stage("write");
-  OutputsTogether outputs({arguments.output, arguments.vdb, arguments.summary});
   if (!arguments.vdb.empty()) write_vdb(result.body, arguments.vdb);
   if (!arguments.summary.empty()) write_text(summary_json(result), arguments.summary);
-  write_body(result.body, arguments.output, {.compress = arguments.compress});
+  if (options.pieces == 0) write_body(result.body, arguments.output, {.compress = arguments.compress});
   outputs.appear();
   progress.finish();
   if (arguments.json) write_text(summary_json(result), "-");

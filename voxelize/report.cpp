@@ -109,7 +109,7 @@ void report_each(const VoxelizeResult& result, Progress& progress) {
       progress.say(fmt::format("{}: {} with several pieces, kept apart", lattice.name,
                                counted(part.split_voxels, "voxel")));
     say_repairs(part, lattice.name, progress);
-    say_walls(part, lattice.name, !result.body.moments.empty(), progress);
+    say_walls(part, lattice.name, result.with_moments, progress);
     if (lattice.placement == Placement::corner) say_lost_matter(part, lattice.name, progress);
   }
 }

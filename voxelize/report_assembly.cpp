@@ -112,7 +112,7 @@ void say_losses(const VoxelizeResult& result, Progress& progress) {
   const Has thin = [&](const VoxelizedPart& part) {
     return part.thinnest && part.thin_walls > 0 && !lost(part);
   };
-  const bool with_moments = !result.body.moments.empty();
+  const bool with_moments = result.with_moments;
   if (const std::string which = parts_with(result, lost); !which.empty() && with_moments)
     progress.say(fmt::format("walls thinner than one cell in {}, the thinnest {}: {}", which, thinnest(lost),
                              kForQuadratic));

@@ -8,12 +8,15 @@
 #include <limits>
 
 #include "base/error.h"
+#include "base/human.h"
 #include "base/nearest_word.h"
 #include "base/program/share_scope.h"
 #include "base/resources.h"
 #include "base/stop.h"
 #include "base/units.h"
 #include "formats/exchange/resolution.h"
+#include "formats/lattice/body_file.h"
+#include "formats/pieces/pieces.h"
 #include "voxelize/classify/assign_polygons.h"
 #include "voxelize/classify/axis_parity.h"
 #include "voxelize/classify/classify.h"
@@ -27,6 +30,7 @@
 #include "voxelize/memory.h"
 #include "voxelize/mesh/part_mesh.h"
 #include "voxelize/neighbours.h"
+#include "voxelize/slabs/slab_body.h"
 #include "voxelize/walls.h"
 
 namespace flexel::voxelize {
@@ -110,8 +114,7 @@ void check_meshes(const std::vector<HealedPart>& meshes, const Surface& surface)
   }
 }
 
-VoxelizedPart describe(const HealedPart& healed, const Voxels& voxels, const AssembledPart& assembled,
-                       const Part& part) {
+VoxelizedPart describe(const HealedPart& healed, const AssembledPart& assembled, const Part& part) {
   VoxelizedPart found;
   const PartMesh& mesh = healed.mesh;
   const double voxel = part.lattice.spacing.prod();
@@ -124,13 +127,16 @@ VoxelizedPart describe(const HealedPart& healed, const Voxels& voxels, const Ass
   found.dropped_cells = assembled.dropped_cells;
   found.spacing = part.lattice.spacing;
   found.healing = healed.done;
+  return found;
+}
+
+void add_counts(const Voxels& voxels, VoxelizedPart& found) {
   for (const Slab& slab : voxels.slabs) {
     found.split_voxels += slab.split_voxels;
     found.overlapping_voxels += slab.overlapping_voxels;
     found.undecided_voxels += slab.undecided_voxels;
     found.disagreements += slab.disagreements;
   }
-  return found;
 }
 
 // Walls of a part: the thinnest, and how many samples are thinner than two cells.
@@ -221,28 +227,69 @@ std::optional<Voxels> classify(HealedPart& part, const Lattice& lattice, const V
   return std::move(sampled.voxels);
 }
 
-// One part onto the body; nothing where its inside cannot be told from outside.
-std::optional<VoxelizedPart> voxelize_part(HealedPart& healed, double spacing, const VoxelizeOptions& options,
-                                           const std::string& name, Body& body, PolygonCells& polygon_cells) {
-  const bool centre = options.placement == Placement::centre;
-  PartMesh& mesh = healed.mesh;
-  Part part;
-  part.name = name;
-  part.material = options.material;
-  part.placement = options.placement;
-  part.lattice = align_lattice(mesh, spacing, options.align, centre);
-  place_on_lattice(mesh, part.lattice);
-  const std::optional<Voxels> voxels = classify(healed, part.lattice, options, name);
-  if (!voxels) return std::nullopt;
-  const AssembledPart assembled = assemble_part(*voxels, part, body, polygon_cells);
-  const std::size_t spread = options.moments ? append_moments(*voxels, body) : 0;
+void require_elements(const AssembledPart& assembled, const PartMesh& mesh, const std::string& name,
+                      double spacing) {
   if (assembled.elements == 0 && enclosed_volume(mesh) < 0)
     throw InputError(fmt::format("part \"{}\" is inside out; --heal auto turns it", name));
   if (assembled.elements == 0)
     throw InputError(fmt::format("nothing of part \"{}\" is left at size {}; choose a smaller size", name,
                                  human_length(spacing)));
-  VoxelizedPart described = describe(healed, *voxels, assembled, part);
+}
+
+// The part on its lattice.
+Part placed_part(HealedPart& healed, double spacing, const VoxelizeOptions& options,
+                 const std::string& name) {
+  Part part;
+  part.name = name;
+  part.material = options.material;
+  part.placement = options.placement;
+  part.lattice = align_lattice(healed.mesh, spacing, options.align, options.placement == Placement::centre);
+  place_on_lattice(healed.mesh, part.lattice);
+  return part;
+}
+
+// What was made of all parts.
+struct Made {
+  VoxelizeResult result;
+  std::vector<PartLayers>
+      layers;  // (parts) where the lattice is cut into pieces: the body has no elements then
+  PolygonCells polygon_cells;
+};
+
+// One part onto the body; nothing where its inside cannot be told from outside.
+std::optional<VoxelizedPart> voxelize_part(HealedPart& healed, double spacing, const VoxelizeOptions& options,
+                                           const std::string& name, Made& made) {
+  const Part part = placed_part(healed, spacing, options, name);
+  const std::optional<Voxels> voxels = classify(healed, part.lattice, options, name);
+  if (!voxels) return std::nullopt;
+  Body& body = made.result.body;
+  const AssembledPart assembled = assemble_part(*voxels, part, body, made.polygon_cells);
+  const std::size_t spread = options.moments ? append_moments(*voxels, body) : 0;
+  require_elements(assembled, healed.mesh, name, spacing);
+  VoxelizedPart described = describe(healed, assembled, part);
+  add_counts(*voxels, described);
   described.spread_cells = spread;
+  return described;
+}
+
+// Counts what the part will have, for its lattice is made in pieces.
+VoxelizedPart survey_part(HealedPart& healed, double spacing, const VoxelizeOptions& options,
+                          const std::string& name, Made& made) {
+  if (!healed.mesh.balanced())
+    throw InputError(
+        fmt::format("part \"{}\": its surface is not closed, and --pieces needs it to be; {}leave "
+                    "out --pieces",
+                    name, options.heal.mode == Heal::wrap ? "" : "use --heal wrap, or "));
+  const Part part = placed_part(healed, spacing, options, name);
+  if (!healed.original.corners.empty()) place_on_lattice(healed.original, part.lattice);
+  Survey survey = survey_layers(healed, options.moments ? kDroppedFillWithMoments : kDroppedFill);
+  require_elements(survey.found, healed.mesh, name, spacing);
+  VoxelizedPart described = describe(healed, survey.found, part);
+  described.split_voxels = survey.split_voxels;
+  described.undecided_voxels = survey.undecided_voxels;
+  described.overlapping_voxels = survey.overlapping_voxels;
+  made.result.body.parts.push_back(part);
+  made.layers.push_back(std::move(survey.layers));
   return described;
 }
 
@@ -252,28 +299,30 @@ std::string file_of(const Surface& surface, std::size_t part) {
 }
 
 // All parts at one spacing.
-VoxelizeResult build(Surface& surface, std::vector<HealedPart>& meshes, double spacing,
-                     const VoxelizeOptions& options, const Stretch& stretch) {
-  VoxelizeResult result;
-  PolygonCells polygon_cells;
+Made build(Surface& surface, std::vector<HealedPart>& meshes, double spacing, const VoxelizeOptions& options,
+           const Stretch& stretch) {
+  Made made;
   std::vector<UndecidedPart> open;
   for (std::size_t p = 0; p < meshes.size(); ++p) {
     check_stop();
-    const ShareScope scope = stretch.part(p, meshes.size(), surface.parts[p].name);
-    if (auto part =
-            voxelize_part(meshes[p], spacing, options, surface.parts[p].name, result.body, polygon_cells))
-      result.parts.push_back(std::move(*part));
+    const std::string& name = surface.parts[p].name;
+    const ShareScope scope = stretch.part(p, meshes.size(), name);
+    if (options.pieces > 0)
+      made.result.parts.push_back(survey_part(meshes[p], spacing, options, name, made));
+    else if (auto part = voxelize_part(meshes[p], spacing, options, name, made))
+      made.result.parts.push_back(std::move(*part));
     else
-      open.push_back({surface.parts[p].name, file_of(surface, p), &meshes[p]});
+      open.push_back({name, file_of(surface, p), &meshes[p]});
   }
   if (!open.empty()) throw undecided(open, meshes.size());
-  Body& body = result.body;
+  Body& body = made.result.body;
   std::swap(body.surface, surface);
-  if (options.placement == Placement::corner) {
-    set_surface_cells(polygon_cells, body);
+  if (options.placement == Placement::corner && options.pieces == 0) {
+    set_surface_cells(made.polygon_cells, body.surface.polygon_count(), body);
     derive_connections(body);
   }
-  return result;
+  made.polygon_cells.clear();
+  return made;
 }
 
 double total_cells(const VoxelizeResult& result, Placement placement) {
@@ -341,39 +390,101 @@ VoxelizeOptions without_moments(VoxelizeOptions options) {
   return options;
 }
 
-VoxelizeResult correct_count(VoxelizeResult result, double spacing, std::vector<HealedPart>& meshes,
-                             const std::vector<PartExtent>& extents, const VoxelizeOptions& options,
-                             Stretch stretch) {
+Made correct_count(Made made, double spacing, std::vector<HealedPart>& meshes,
+                   const std::vector<PartExtent>& extents, const VoxelizeOptions& options, Stretch stretch) {
   constexpr int kCorrections = 3;
   CountSearch search(extents, options);
-  search.add(spacing, total_cells(result, options.placement));
+  search.add(spacing, total_cells(made.result, options.placement));
   Surface surface;
   const auto build_at = [&](double next, const VoxelizeOptions& how) {
     stretch.from = stretch.to;
     stretch.to += kOfRest * (kBuilt - stretch.to);
     spacing = next;
     check_spacing(spacing, meshes, surface);
-    result = build(surface, meshes, spacing, how, stretch);
+    made = build(surface, meshes, spacing, how, stretch);
   };
   const VoxelizeOptions quick = without_moments(options);
   for (int n = 0; n < kCorrections && !search.close(); ++n) {
     const std::optional<double> next = search.next();
     if (!next) break;
-    std::swap(surface, result.body.surface);
+    std::swap(surface, made.result.body.surface);
     try {
       build_at(*next, quick);
     } catch (const InputError&) {  // as small a count cannot be met: the best before stays
       spacing = 0;
       break;
     }
-    search.add(spacing, total_cells(result, options.placement));
+    search.add(spacing, total_cells(made.result, options.placement));
   }
   if (spacing != search.best() || options.moments) {
-    if (surface.parts.empty()) std::swap(surface, result.body.surface);
+    if (surface.parts.empty()) std::swap(surface, made.result.body.surface);
     build_at(search.best(), options);
   }
-  result.size = spacing;
-  return result;
+  made.result.size = spacing;
+  return made;
+}
+
+// Everything but the bodies of pieces. `meshes`: set to the parts, healed and on their lattices.
+Made make(Surface surface, const VoxelizeOptions& options, std::vector<HealedPart>& meshes,
+          Progress& progress) {
+  if (options.moments && options.placement == Placement::centre)
+    throw InputError("--moments: centre placement has no cells; use --placement corner");
+  progress.stage("heal");
+  const double limit = options.max_memory.value_or(memory_to_use());
+  const double at_once = 1 / static_cast<double>(std::max<std::size_t>(1, options.pieces));  // of all cells
+  meshes = heal_parts(surface, options.heal, limit, progress);
+  check_meshes(meshes, surface);
+  progress.stage("voxelize");
+  const std::vector<PartExtent> extents = extents_of(meshes);
+  const double spacing = choose_spacing(options, extents);
+  check_spacing(spacing, meshes, surface);
+  double estimate = 0;
+  for (std::size_t p = 0; p < extents.size(); ++p)
+    estimate +=
+        std::min(estimate_cells(extents[p], spacing, options.placement), cells_of_box(meshes[p], spacing));
+  // a lattice has more elements than cells, and the estimate may be high
+  check_elements(at_once * estimate / 2, "");
+  check_memory(at_once * estimate, options, limit, extents);
+  const Stretch first{progress, 0, options.size ? kBuilt : kOfRest * kBuilt};
+  Made made = build(surface, meshes, spacing, options.size ? options : without_moments(options), first);
+  made.result.size = spacing;
+  if (!options.size) made = correct_count(std::move(made), spacing, meshes, extents, options, first);
+  VoxelizeResult& result = made.result;
+  const double cells = total_cells(result, options.placement);
+  check_elements(static_cast<double>(result.body.element_count()), "");
+  check_memory(at_once * cells, options, limit, extents);
+  measure(meshes, result, {progress, kBuilt, 1});
+  std::vector<double> cell;
+  for (const VoxelizedPart& part : result.parts) cell.push_back(part.spacing.maxCoeff());
+  result.pairs = noteworthy_pairs(meshes, cell);
+  refuse_duplicates(result.pairs, result.body.surface);
+  result.with_moments = options.moments;
+  result.simulation_memory = simulation_memory(cells, options.placement, options.moments);
+  return made;
+}
+
+void say_pieces(const SlabBodies& slabs, std::size_t pieces, Progress& progress) {
+  std::size_t largest = 0, all = 0;
+  for (std::uint32_t index = 0; index < pieces; ++index) {
+    largest = std::max(largest, slabs.own_cells(index));
+    all += slabs.own_cells(index);
+  }
+  progress.say(fmt::format("{}, the largest with {}, {:.2f} times the mean", counted(pieces, "piece"),
+                           counted(largest, "cell"),
+                           static_cast<double>(largest * pieces) / static_cast<double>(all)));
+}
+
+// What the pieces are made from: those of two runs can be put together only where it is the same.
+std::uint64_t run_of(const Body& whole, const SlabBodies& slabs, const VoxelizeOptions& options) {
+  std::vector<std::uint64_t> from = {surface_hash(whole.surface), options.moments, options.pieces};
+  for (std::size_t p = 0; p < whole.parts.size(); ++p) {
+    const Part& part = whole.parts[p];
+    from.push_back(content_hash(std::as_bytes(std::span(&part.lattice, 1))));
+    from.push_back(content_hash(std::as_bytes(std::span(part.name))));
+    from.push_back(content_hash(std::as_bytes(std::span(part.material))));
+    from.insert(from.end(), slabs.cuts()[p].begin(), slabs.cuts()[p].end());
+  }
+  return run_number(from);
 }
 
 }  // namespace
@@ -386,38 +497,38 @@ Placement placement_choice(const std::string& word) {
 }
 
 VoxelizeResult voxelize(Surface surface, const VoxelizeOptions& options, Progress& progress) {
-  if (options.moments && options.placement == Placement::centre)
-    throw InputError("--moments: centre placement has no cells; use --placement corner");
-  progress.stage("heal");
-  const double limit = options.max_memory.value_or(memory_to_use());
-  std::vector<HealedPart> meshes = heal_parts(surface, options.heal, limit, progress);
-  check_meshes(meshes, surface);
-  progress.stage("voxelize");
-  const std::vector<PartExtent> extents = extents_of(meshes);
-  const double spacing = choose_spacing(options, extents);
-  check_spacing(spacing, meshes, surface);
-  double estimate = 0;
-  for (std::size_t p = 0; p < extents.size(); ++p)
-    estimate +=
-        std::min(estimate_cells(extents[p], spacing, options.placement), cells_of_box(meshes[p], spacing));
-  check_elements(estimate / 2, "");  // a lattice has more elements than cells, and the estimate may be high
-  check_memory(estimate, options, limit, extents);
-  const Stretch first{progress, 0, options.size ? kBuilt : kOfRest * kBuilt};
-  VoxelizeResult result =
-      build(surface, meshes, spacing, options.size ? options : without_moments(options), first);
-  result.size = spacing;
-  if (!options.size) result = correct_count(std::move(result), spacing, meshes, extents, options, first);
-  const double cells = total_cells(result, options.placement);
-  check_elements(static_cast<double>(result.body.element_count()), "");
-  check_memory(cells, options, limit, extents);
-  measure(meshes, result, {progress, kBuilt, 1});
-  std::vector<double> cell;
-  for (const VoxelizedPart& part : result.parts) cell.push_back(part.spacing.maxCoeff());
-  result.pairs = noteworthy_pairs(meshes, cell);
-  refuse_duplicates(result.pairs, result.body.surface);
-  result.simulation_memory = simulation_memory(cells, options.placement, options.moments);
+  std::vector<HealedPart> meshes;
+  VoxelizeResult result = make(std::move(surface), options, meshes, progress).result;
   progress.finish();
   return result;
+}
+
+VoxelizeResult voxelize_pieces(Surface surface, const VoxelizeOptions& options, const UsePiece& use,
+                               Progress& progress) {
+  if (options.placement == Placement::centre)
+    throw InputError("--pieces: centre placement has no cells; use --placement corner");
+  std::vector<HealedPart> meshes;
+  Made made = make(std::move(surface), options, meshes, progress);
+  VoxelizeResult& result = made.result;
+  std::vector<SlabPart> parts;
+  for (std::size_t p = 0; p < meshes.size(); ++p)
+    parts.push_back({result.body.parts[p], &meshes[p], &made.layers[p]});
+  const SlabBodies slabs(std::move(parts), options.pieces, result.body.surface.polygon_count(),
+                         options.moments);
+  say_pieces(slabs, options.pieces, progress);
+  const std::uint64_t run = run_of(result.body, slabs, options);
+  progress.stage("pieces");
+  for (std::uint32_t index = 0; index < options.pieces; ++index) {
+    const double each = 1 / static_cast<double>(options.pieces);
+    const ShareScope scope(progress, each * index, each * (index + 1), fmt::format("piece {}", index));
+    std::vector<std::size_t> spread;
+    PieceBody piece = slabs.make(index, spread);
+    for (std::size_t p = 0; p < spread.size(); ++p) result.parts[p].spread_cells += spread[p];
+    piece.numbers.run = run;
+    use(result.body, piece);
+  }
+  progress.finish();
+  return std::move(result);
 }
 
 }  // namespace flexel::voxelize

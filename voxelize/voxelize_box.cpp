@@ -52,7 +52,7 @@ Body BoxVoxelizer::operator()(const Lattice& lattice, const Index3& lower, const
     throw InputError("part \"" + part.name + "\": nothing of it lies in the box");
   (void)append_moments(voxels, body);
   body.surface = surface_;
-  set_surface_cells(polygon_cells, body);
+  set_surface_cells(polygon_cells, body.surface.polygon_count(), body);
   derive_connections(body);
   return body;
 }

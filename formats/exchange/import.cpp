@@ -20,6 +20,7 @@
 #include "formats/lattice/body_file.h"
 #include "formats/part/part_name.h"
 #include "formats/part/subdivide.h"
+#include "formats/vtu/vtu_head.h"
 
 namespace flexel {
 namespace {
@@ -132,6 +133,11 @@ const FileReader& sniff(const ImportInput& input, const std::string& path) {
   const auto [found, evidence] = strongest(input);
   if (evidence > Evidence::weak) return *found;
   if (path != "-") refuse_unread(input, unread_extension(extension(path)));
+  if (vtu::is_file_of(input.bytes, "PUnstructuredGrid"))
+    throw InputError(
+        input.where,
+        "lists the pieces of a lattice: flexel-map maps it and flexel info says what it holds; what "
+        "draws bodies draws a piece, if that is named (.vtu)");
   if (looks_like_body(input.bytes))
     throw InputError(
         input.where,

@@ -1,10 +1,12 @@
-// Names of the arrays of a body file, for its writer and its reader; docs/reference/body-file.md explains them.
+// Names of the arrays of a body file, for its writer and its reader; docs/reference/body-file.md explains them. And what
+// pieces of a lattice (formats/pieces), whose files hold more arrays and share one surface, take of both.
 #pragma once
 #include <array>
 #include <string>
 
+#include "formats/lattice/body_file.h"
 #include "formats/part/column.h"
-#include "formats/vtu/vtu.h"
+#include "formats/vtu/vtu_head.h"
 
 namespace flexel::names {
 
@@ -37,6 +39,11 @@ constexpr const char* types = "types";
 constexpr const char* fill = "fill";
 constexpr const char* material = "material";
 constexpr const char* broken = "broken";
+// Of pieces alone
+constexpr const char* ghost = "vtkGhostType";
+constexpr const char* pieces_run = "pieces_run";
+constexpr const char* pieces_index = "pieces_index";
+constexpr const char* pieces_points = "pieces_points";
 
 // Our corner a = i + 2 j + 4 k at place v of VTK's hexahedron (which runs around the lower face, then the
 // upper). Its own inverse.
@@ -45,9 +52,10 @@ constexpr std::uint8_t vtk_hexahedron = 12, vtk_vertex = 1;
 
 // True for the arrays of point or cell data that are not columns.
 [[nodiscard]] inline bool reserved(const std::string& name, vtu::Section section) {
+  if (name == ghost) return true;
   if (section == vtu::Section::point_data)
-    return name == rest || name == displacement || name == lattice_index || name == piece || name == part ||
-           name == connections;
+    return name == vtu::kGlobalPointIds || name == rest || name == displacement || name == lattice_index ||
+           name == piece || name == part || name == connections;
   return name == fill || name == part || name == material || name == broken;
 }
 
@@ -56,3 +64,16 @@ constexpr std::uint8_t vtk_hexahedron = 12, vtk_vertex = 1;
 }
 
 }  // namespace flexel::names
+
+namespace flexel {
+
+// A piece's file: the arrays of the body, with the cells under polygons and the moments but not the surface, which the
+// file `surface` holds (a body file without elements), and `more`. All of them are returned, to be listed.
+std::vector<vtu::HeadArray> write_piece_body(const Body& body, const std::string& path,
+                                             const SurfaceBeside& surface,
+                                             const std::vector<vtu::Array>& more, bool compress);
+
+// The body that such a file holds. Throws InputError as read_body does.
+[[nodiscard]] Body read_piece_body(const vtu::File& file, const std::string& path);
+
+}  // namespace flexel

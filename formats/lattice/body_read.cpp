@@ -15,7 +15,7 @@
 #include "formats/lattice/body_metadata.h"
 #include "formats/lattice/cell_moments.h"
 #include "formats/lattice/column_names.h"
-#include "formats/vtu/vtu.h"
+#include "formats/vtu/vtu_head.h"
 
 namespace flexel {
 namespace {
@@ -32,6 +32,10 @@ void require_version(const vtu::File& file) {
     file.fail(fmt::format(
         "is a body file of version {}; this program reads version {}: use the programs of one release",
         version.front(), kBodyFileVersion));
+}
+
+bool is_piece(const vtu::File& file) {
+  return file.has(Section::field, names::pieces_run);
 }
 
 Metadata read_metadata(const vtu::File& file, const std::string& where) {
@@ -92,11 +96,14 @@ void read_surface(const vtu::File& file, const Metadata& metadata, Body& body) {
       file.fail(fmt::format("damaged: flexel_metadata: face_names names face {}", face));
     surface.faces[face].name = name;
   }
-  body.surface_cell_offsets = file.read<std::uint32_t>(Section::field, names::surface_cell_offsets);
-  body.surface_cells = file.read<std::uint32_t>(Section::field, names::surface_cells);
   read_sources(file, metadata, surface);
   read_surface_columns(file, names::surface_vertex_columns, surface.vertex_columns);
   read_surface_columns(file, names::surface_polygon_columns, surface.polygon_columns);
+}
+
+void read_surface_cells(const vtu::File& file, Body& body) {
+  body.surface_cell_offsets = file.read<std::uint32_t>(Section::field, names::surface_cell_offsets);
+  body.surface_cells = file.read<std::uint32_t>(Section::field, names::surface_cells);
 }
 
 void read_columns(const vtu::File& file, Section section, std::size_t count, Columns& columns) {
@@ -173,53 +180,111 @@ void read_moments(const vtu::File& file, Body& body) {
     body.moments.insert(body.moments.end(), each.begin(), each.end());
 }
 
-struct ReadBody {
-  Body body;
-  std::optional<SurfaceBeside> beside;
-};
-
-ReadBody read_file(Bytes bytes, const std::string& where) {
+vtu::File open_body(Bytes bytes, const std::string& where) {
+  if (vtu::is_file_of(bytes, "PUnstructuredGrid"))
+    throw InputError(where,
+                     "lists the pieces of a lattice, and one body is needed here: name one of its pieces "
+                     "(.vtu), or let flexel-voxelize write the whole, without --pieces");
   if (!looks_like_body(bytes))
     throw InputError(where,
                      "is not a body file: one written by flexel-voxelize or flexel-simulate is needed");
-  const vtu::File file(std::move(bytes), where);
+  vtu::File file(std::move(bytes), where);
   require_version(file);
+  return file;
+}
+
+// All but what lies in another file, not checked yet. A piece keeps its cells under polygons and its moments.
+Metadata read_arrays(const vtu::File& file, const std::string& where) {
   Metadata metadata = read_metadata(file, where);
-  Body body = std::move(metadata.body);
+  Body& body = metadata.body;
   check_elements(body.parts.empty() ? 0 : static_cast<double>(body.parts.back().element_end), where);
   read_elements(file, body);
   read_cells(file, body);
   read_moments(file, body);
   if (metadata.with_surface) read_surface(file, metadata, body);
+  if (metadata.with_surface || is_piece(file)) read_surface_cells(file, body);
+  return metadata;
+}
+
+struct ReadBody {
+  Body body;
+  std::optional<SurfaceBeside> beside;
+};
+
+ReadBody read_file(const vtu::File& file, const std::string& where) {
+  Metadata metadata = read_arrays(file, where);
+  Body& body = metadata.body;
+  if (metadata.with_surface && body.element_count() == 0)
+    file.fail("holds the surface that pieces share, no lattice: name their .pvtu, or one of them");
+  if (is_piece(file)) {  // without its surface these would belong to no polygon
+    body.surface_cell_offsets.clear();
+    body.surface_cells.clear();
+  }
   check(body, where);
   return {std::move(body), std::move(metadata.beside)};
 }
 
-void take_surface_beside(Body& frame, const SurfaceBeside& beside, const std::string& path) {
+// The file beside `path` that it says holds its surface.
+std::string beside_path(const SurfaceBeside& beside, const std::string& path, const char* is) {
   const std::string file = (std::filesystem::path(path).parent_path() / beside.file).string();
-  const auto fail = [&](const std::string& what) {
-    throw InputError(path, fmt::format("is a frame of a series whose surface is in \"{}\" beside it, {}",
-                                       beside.file, what));
-  };
   refuse_device(file, path);
   std::error_code ignored;
-  if (!std::filesystem::exists(file, ignored)) fail("which is missing: copy that along");
-  Body from = read_file(read_all(file), file).body;
-  if (surface_hash(from.surface) != beside.hash) fail("which has another one now: take that of the same run");
+  if (!std::filesystem::exists(file, ignored))
+    throw InputError(path, fmt::format("is {} whose surface is in \"{}\" beside it, which is missing: copy "
+                                       "that along",
+                                       is, beside.file));
+  return file;
+}
+
+void require_surface(const Surface& surface, const SurfaceBeside& beside, const std::string& path,
+                     const char* is) {
+  if (surface_hash(surface) != beside.hash)
+    throw InputError(path,
+                     fmt::format("is {} whose surface is in \"{}\" beside it, which has another one now: "
+                                 "take that of the same run",
+                                 is, beside.file));
+}
+
+void take_surface_beside(Body& frame, const SurfaceBeside& beside, const std::string& path) {
+  constexpr const char* kIs = "a frame of a series";
+  const std::string file = beside_path(beside, path, kIs);
+  Body from = read_file(open_body(read_all(file), file), file).body;
+  require_surface(from.surface, beside, path, kIs);
   take_surface(frame, from, path);
 }
 
 }  // namespace
 
+Body read_piece_body(const vtu::File& file, const std::string& path) {
+  constexpr const char* kIs = "a piece";
+  require_version(file);
+  Metadata metadata = read_arrays(file, path);
+  Body& body = metadata.body;
+  if (metadata.beside) {
+    const std::string beside = beside_path(*metadata.beside, path, kIs);
+    const vtu::File shared = open_body(read_all(beside), beside);
+    const Metadata with = read_metadata(shared, beside);
+    Body from = with.body;
+    if (!with.with_surface) shared.fail("is to hold the surface of pieces and has none");
+    read_surface(shared, with, from);
+    require_surface(from.surface, *metadata.beside, path, kIs);
+    body.surface = std::move(from.surface);
+  }
+  check(body, path);
+  return std::move(body);
+}
+
 Body read_body(const std::string& path) {
   if (path == "-") return read_body(read_all(path), "stdin");
-  ReadBody read = read_file(read_all(path), path);
+  const vtu::File file = open_body(read_all(path), path);
+  if (is_piece(file)) return read_piece_body(file, path);
+  ReadBody read = read_file(file, path);
   if (read.beside) take_surface_beside(read.body, *read.beside, path);
   return std::move(read.body);
 }
 
 Body read_body(Bytes bytes, const std::string& where) {
-  return read_file(std::move(bytes), where).body;
+  return read_file(open_body(std::move(bytes), where), where).body;
 }
 
 Body read_frame(const std::string& path) {
@@ -241,11 +306,7 @@ void take_surface(Body& frame, Body& from, const std::string& where) {
 }
 
 bool looks_like_body(std::span<const std::byte> bytes) {
-  constexpr std::size_t kHead = 1024;
-  std::string_view head(reinterpret_cast<const char*>(bytes.data()), std::min(bytes.size(), kHead));
-  head.remove_prefix(std::min(head.find_first_not_of(" \t\r\n"), head.size()));
-  return (head.starts_with("<?xml") || head.starts_with("<VTKFile")) && head.find("<VTKFile") != head.npos &&
-         head.find("\"UnstructuredGrid\"") != head.npos;
+  return vtu::is_file_of(bytes, "UnstructuredGrid");
 }
 
 }  // namespace flexel

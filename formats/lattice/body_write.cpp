@@ -90,8 +90,6 @@ void add_surface(const Body& body, const Workspace& work, std::vector<vtu::Array
   add_surface_columns(names::surface_vertex_columns, surface.vertex_columns, surface.vertices.size(), arrays);
   add_surface_columns(names::surface_polygon_columns, surface.polygon_columns, surface.polygon_count(),
                       arrays);
-  arrays.push_back(array_of(Section::field, names::surface_cell_offsets, body.surface_cell_offsets));
-  arrays.push_back(array_of(Section::field, names::surface_cells, body.surface_cells));
   arrays.push_back(array_of(Section::field, names::surface_source_bytes, work.source_bytes));
   arrays.push_back(array_of(Section::field, names::surface_source_headers, work.source_headers));
 }
@@ -194,17 +192,28 @@ void require_sizes(const Body& body) {
   if (!agree) throw std::logic_error("write_body: the sizes of the body's arrays do not agree");
 }
 
-void write_to(OutputFile& output, const Body& body, const BodyFileOptions& options) {
-  require_sizes(body);
-  const bool with_surface = !options.surface_beside && has_surface(body.surface);
-  const Workspace work = prepare(body, options, with_surface);
+void add_surface_cells(const Body& body, std::vector<vtu::Array>& arrays) {
+  arrays.push_back(array_of(Section::field, names::surface_cell_offsets, body.surface_cell_offsets));
+  arrays.push_back(array_of(Section::field, names::surface_cells, body.surface_cells));
+}
+
+std::vector<vtu::Array> arrays_of(const Body& body, const Workspace& work, bool with_surface) {
   std::vector<vtu::Array> arrays;
   arrays.push_back(array_of(Section::field, names::version, work.version));
   arrays.push_back(array_of(Section::field, names::metadata, work.metadata));
   if (with_surface) add_surface(body, work, arrays);
-  if (!options.surface_beside) add_moments(body, arrays);
   add_elements(body, work, arrays);
   add_cells(body, work, arrays);
+  return arrays;
+}
+
+void write_to(OutputFile& output, const Body& body, const BodyFileOptions& options) {
+  require_sizes(body);
+  const bool with_surface = !options.surface_beside && has_surface(body.surface);
+  const Workspace work = prepare(body, options, with_surface);
+  std::vector<vtu::Array> arrays = arrays_of(body, work, with_surface);
+  if (with_surface) add_surface_cells(body, arrays);
+  if (!options.surface_beside) add_moments(body, arrays);
   vtu::write(output, body.element_count(), body.cell_count() + work.vertex_elements.size(), arrays,
              options.compress);
   output.commit();
@@ -222,6 +231,24 @@ Bytes body_bytes(const Body& body) {
   OutputFile output(bytes);
   write_to(output, body, {});
   return bytes;
+}
+
+std::vector<vtu::HeadArray> write_piece_body(const Body& body, const std::string& path,
+                                             const SurfaceBeside& surface,
+                                             const std::vector<vtu::Array>& more, bool compress) {
+  require_sizes(body);
+  const Workspace work = prepare(body, {.surface_beside = surface}, false);
+  std::vector<vtu::Array> arrays = arrays_of(body, work, false);
+  add_surface_cells(body, arrays);
+  add_moments(body, arrays);
+  arrays.insert(arrays.end(), more.begin(), more.end());
+  OutputFile output(path);
+  vtu::write(output, body.element_count(), body.cell_count(), arrays, compress);
+  output.commit();
+  std::vector<vtu::HeadArray> heads;
+  for (const vtu::Array& array : arrays)
+    heads.push_back({array.section, array.name, array.type, array.components, {}, 0});
+  return heads;
 }
 
 std::uint64_t surface_hash(const Surface& surface) {

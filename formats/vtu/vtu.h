@@ -89,6 +89,9 @@ template <class Entry, class Make>
           make};
 }
 
+// Point data of this name are VTK's global ids: the same in every file for the same point.
+constexpr const char* kGlobalPointIds = "GlobalPointIds";
+
 // Appends the whole file to `output`, without committing it.
 void write(OutputFile& output, std::size_t points, std::size_t cells, const std::vector<Array>& arrays,
            bool compress);

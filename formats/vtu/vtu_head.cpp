@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <pugixml.hpp>
 
@@ -103,6 +104,14 @@ std::string HeadArray::shown() const {
 
 Head parse_head(std::string_view text, const std::string& where) {
   return HeadParser(where).parse(text);
+}
+
+bool is_file_of(std::span<const std::byte> bytes, const std::string& type) {
+  constexpr std::size_t kHead = 1024;
+  std::string_view head(reinterpret_cast<const char*>(bytes.data()), std::min(bytes.size(), kHead));
+  head.remove_prefix(std::min(head.find_first_not_of(" \t\r\n"), head.size()));
+  return (head.starts_with("<?xml") || head.starts_with("<VTKFile")) && head.find("<VTKFile") != head.npos &&
+         head.find('"' + type + '"') != head.npos;
 }
 
 const char* section_name(Section section) {

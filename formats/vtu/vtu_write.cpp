@@ -13,6 +13,7 @@
 #include "base/files/output_file.h"
 #include "base/parallel.h"
 #include "formats/vtu/vtu.h"
+#include "formats/vtu/vtu_head.h"
 
 namespace flexel::vtu {
 namespace {
@@ -37,6 +38,8 @@ void for_each_chunk(const Array& array, const Use& use) {
   }
 }
 
+}  // namespace
+
 std::string escaped(const std::string& text) {
   std::string result;
   for (const char c : text) {
@@ -60,6 +63,8 @@ std::string escaped(const std::string& text) {
   return result;
 }
 
+namespace {
+
 // One component is not said, as VTK does: readers then give a plain list instead of a table of one column.
 std::string tag(const Array& array, std::uint64_t offset) {
   std::string text = fmt::format("<DataArray type=\"{}\" Name=\"{}\"", array.type, escaped(array.name));
@@ -70,7 +75,12 @@ std::string tag(const Array& array, std::uint64_t offset) {
 
 std::string section_tags(const char* element, Section section, const std::vector<Array>& arrays,
                          const std::vector<std::uint64_t>& offsets) {
-  std::string text = fmt::format("<{}>\n", element);
+  const bool numbered =
+      section == Section::point_data && std::any_of(arrays.begin(), arrays.end(), [](const Array& array) {
+        return array.section == Section::point_data && array.name == kGlobalPointIds;
+      });
+  std::string text = numbered ? fmt::format("<{} GlobalIds=\"{}\">\n", element, kGlobalPointIds)
+                              : fmt::format("<{}>\n", element);
   for (std::size_t i = 0; i < arrays.size(); ++i)
     if (arrays[i].section == section) text += tag(arrays[i], offsets[i]);
   return text + fmt::format("</{}>\n", element);

@@ -107,7 +107,7 @@ SurfaceQuality surface_quality(const Surface& surface, const MapResult& result,
   return quality;
 }
 
-LatticeVolume lattice_volume(const Body& body) {
+LatticeVolume lattice_volume(const Body& body, const std::vector<std::uint8_t>& but) {
   struct Volumes {
     double before = 0, after = 0;
     void operator+=(const Volumes& other) {
@@ -133,7 +133,7 @@ LatticeVolume lattice_volume(const Body& body) {
     return sum;
   };
   const Volumes sum = parallel_sum<Volumes>(body.cell_count(), [&](std::size_t cell) {
-    if (body.broken[cell] != 0) return Volumes{};
+    if (body.broken[cell] != 0 || (!but.empty() && but[cell] != 0)) return Volumes{};
     return Volumes{body.fill[cell] * volume(cell, body.rest), body.fill[cell] * volume(cell, body.position)};
   });
   return {sum.before, sum.after};

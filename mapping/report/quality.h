@@ -14,7 +14,8 @@ namespace flexel::mapping {
 struct LatticeVolume {
   double before = 0, after = 0;
 };
-[[nodiscard]] LatticeVolume lattice_volume(const Body& body);
+// `but`: (cells) 1: left out; empty: none.
+[[nodiscard]] LatticeVolume lattice_volume(const Body& body, const std::vector<std::uint8_t>& but = {});
 
 // Largest |principal stretch - 1| of a deformation gradient.
 [[nodiscard]] double stretch(const Mat3& gradient);

@@ -50,6 +50,20 @@ def test_compressed_equals_raw():
         expect(np.array_equal(array, small[name]), f"\"{name}\" differs")
 
 
+def test_pieces():
+    """Each piece by itself; their own cells are all cells, and a number of a point is one place."""
+    expect_ok(run("flexel-voxelize", box(), "--size", "5 mm", "--pieces", "3", "-o", "body.pvtu"))
+    own, places = 0, {}
+    for index in range(3):
+        mesh = meshio.read(f"body_{index}.vtu")
+        own += int(np.sum(mesh.cell_data["vtkGhostType"][0] == 0))
+        for number, place in zip(mesh.point_data["GlobalPointIds"], mesh.points):
+            expect(places.setdefault(int(number), tuple(place)) == tuple(place), f"point {number} is in two places")
+        head = open(f"body_{index}.vtu", "rb").read(4096)
+        expect(b'GlobalIds="GlobalPointIds"' in head, f"VTK's global ids wanted: {head}")
+    expect(own == 32 and sorted(places) == list(range(81)), f"{own} own cells, {len(places)} points")
+
+
 def test_hexahedra_are_right_handed():
     mesh = meshio.read(body())
     corners = mesh.points[mesh.cells[0].data]

@@ -7,7 +7,7 @@ import sys
 
 from files import stl_triangles
 
-from harness import Skip, body, bracket, expect, expect_ok, main, need, run, scene
+from harness import Skip, body, box, bracket, expect, expect_ok, main, need, run, scene
 
 
 def bent_bracket(name):
@@ -84,14 +84,38 @@ assert grid.GetPointData().GetNumberOfArrays() > 0 and grid.GetCellData().GetArr
 """
 
 
-def test_paraview():
+PARAVIEW_PIECES = """
+from paraview.simple import XMLPartitionedUnstructuredGridReader
+from paraview import servermanager
+reader = XMLPartitionedUnstructuredGridReader(FileName=["{path}"])
+reader.UpdatePipeline()
+grid = servermanager.Fetch(reader)
+ghosts = grid.GetCellData().GetArray("vtkGhostType")
+own = [c for c in range(grid.GetNumberOfCells()) if ghosts is None or ghosts.GetValue(c) == 0]
+assert len(own) == 32, (len(own), grid)
+assert grid.GetPointData().GetGlobalIds() is not None and grid.GetCellData().GetArray("fill") is not None, grid
+"""
+
+
+def need_paraview():
     pvpython = shutil.which("pvpython")
     if pvpython is None and subprocess.run(["/usr/bin/python3", "-c", "import paraview"], stderr=subprocess.DEVNULL,
                                            check=False).returncode != 0:
         raise Skip("ParaView is not installed")
+    return pvpython or sys.executable
+
+
+def test_paraview():
+    pvpython = need_paraview()
     for options in ([], ["--compress"]):
         path = body("body.vtu", *options)
-        expect_ok(run(pvpython or sys.executable, "-c", PARAVIEW.format(path=path), timeout=100))
+        expect_ok(run(pvpython, "-c", PARAVIEW.format(path=path), timeout=100))
+
+
+def test_paraview_reads_pieces():
+    pvpython = need_paraview()
+    expect_ok(run("flexel-voxelize", box(), "--size", "5 mm", "--pieces", "3", "-o", "body.pvtu"))
+    expect_ok(run(pvpython, "-c", PARAVIEW_PIECES.format(path="body.pvtu"), timeout=100))
 
 
 if __name__ == "__main__":

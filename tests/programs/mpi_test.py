@@ -127,6 +127,32 @@ def test_two_ranks_large_deflections():
     expect(every["largest_displacement"] > 0.008, "it should go near the thickness of the bar")
 
 
+def test_pieces_in_and_out():
+    """A list of pieces is the body that it was cut from, and its result in pieces that of the whole; as many pieces as there were, on any ranks."""
+    need_mpi()
+    scene(text=SMALL)
+    box("bar.stl")
+    expect_ok(run("flexel-voxelize", "bar.stl", "--size", "5 mm", "-o", "whole.vtu"))
+    expect_ok(run("flexel-voxelize", "bar.stl", "--size", "5 mm", "--pieces", "3", "-o", "parts.pvtu"))
+    expect_ok(mpi(2, "scene.toml", "whole.vtu", "-o", "bent.vtu", "--no-estimate"))
+    expect_ok(mpi(2, "scene.toml", "parts.pvtu", "-o", "bent.pvtu", "--no-estimate"))
+    whole, found = points("bent.vtu"), {}
+    for p in range(3):
+        piece = points(f"bent_{p}.vtu")
+        for at, moved, stress in zip(piece.point_data["rest"], piece.point_data["displacement"], piece.point_data["von_mises"]):
+            found.setdefault(tuple(round(1e6 * x) for x in at), []).append((moved, stress))
+    expect(len(found) == len(whole.points), f"{len(found)} places in pieces, {len(whole.points)} in the whole")
+    for at, moved, stress in zip(whole.point_data["rest"], whole.point_data["displacement"], whole.point_data["von_mises"]):
+        for piece_moved, piece_stress in found[tuple(round(1e6 * x) for x in at)]:
+            expect((piece_moved == moved).all() and piece_stress == stress, f"at {at}: {piece_moved} and {moved}")
+    expect_ok(run("flexel-map", "bent.pvtu", "-o", "pieces.stl"))
+    expect_ok(run("flexel-map", "bent.vtu", "-o", "whole.stl"))
+    expect(pathlib.Path("pieces.stl").read_bytes() == pathlib.Path("whole.stl").read_bytes(), "mapped from pieces and from the whole")
+    expect_error(mpi(2, "scene.toml", "parts.pvtu", "-o", "bent.vtu"), PROGRAM, "come out as pieces")
+    os.replace("bent_1.vtu", "parts_1.vtu")
+    expect_error(mpi(2, "scene.toml", "parts.pvtu", "-o", "again.pvtu"), PROGRAM, "piece 1", "another run")
+
+
 def test_options_of_petsc():
     need_mpi()
     scene(text=SMALL)

@@ -15,9 +15,9 @@ CODE = ["base", "formats", "meshes", "voxelize", "simulate", "distributed", "map
 ORDER = """
 base base/math base/files base/program
 formats/part formats/common formats/stl formats/obj formats/ply formats/off formats/gltf formats/threemf formats/cad formats/vdb formats/assimp
-formats/vtu formats/lattice formats/exchange
+formats/vtu formats/lattice formats/pieces formats/exchange
 meshes
-voxelize/types voxelize/mesh voxelize/distances voxelize/classify voxelize/heal voxelize/lattice voxelize
+voxelize/types voxelize/mesh voxelize/distances voxelize/classify voxelize/heal voxelize/lattice voxelize/slabs voxelize
 simulate/laws simulate/input simulate/result simulate/linear simulate/state simulate/rigid simulate/conditions simulate/models
 simulate/kernels simulate/matter simulate/gravitation simulate/contact/points simulate/contact/pairs simulate/contact simulate/followers simulate/effects simulate/thermal simulate/paper simulate/joints simulate/indent simulate/events simulate/scene
 simulate/equilibrium simulate/estimate simulate/probes simulate/quadratic/cells simulate/quadratic simulate/conduction simulate/live simulate/stepping simulate/implicit simulate/time simulate/modes simulate

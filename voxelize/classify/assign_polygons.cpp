@@ -86,6 +86,17 @@ void trace_triangle(const PartMesh& mesh, std::uint32_t t, Voxels& voxels, std::
 
 }  // namespace
 
+void trace_polygons(const PartMesh& mesh, const std::vector<std::uint32_t>& polygons, Voxels& voxels) {
+  std::vector<Record> records;
+  for (std::uint32_t t = 0; t < mesh.corners.size(); ++t)
+    if (mesh.polygon[t] != kNoPolygon &&
+        std::binary_search(polygons.begin(), polygons.end(), mesh.polygon[t]))
+      trace_triangle(mesh, t, voxels, records);
+  for (Slab& slab : voxels.slabs)
+    std::stable_sort(slab.traces.begin(), slab.traces.end(),
+                     [](const Trace& a, const Trace& b) { return a.piece < b.piece; });
+}
+
 void trace_missing(const PartMesh& mesh, Voxels& voxels) {
   std::uint32_t polygons = 0;
   for (const std::uint32_t p : mesh.polygon)
@@ -94,12 +105,11 @@ void trace_missing(const PartMesh& mesh, Voxels& voxels) {
   for (const Slab& slab : voxels.slabs)
     for (const Trace& trace : slab.traces)
       if (trace.polygon < polygons) traced[trace.polygon] = 1;
-  std::vector<Record> records;
-  for (std::uint32_t t = 0; t < mesh.corners.size(); ++t)
-    if (mesh.polygon[t] != kNoPolygon && !traced[mesh.polygon[t]]) trace_triangle(mesh, t, voxels, records);
-  for (Slab& slab : voxels.slabs)
-    std::stable_sort(slab.traces.begin(), slab.traces.end(),
-                     [](const Trace& a, const Trace& b) { return a.piece < b.piece; });
+  std::vector<std::uint32_t> missing;
+  for (const std::uint32_t p : mesh.polygon)
+    if (p != kNoPolygon && !traced[p]) missing.push_back(p);
+  std::sort(missing.begin(), missing.end());
+  trace_polygons(mesh, missing, voxels);
 }
 
 }  // namespace flexel::voxelize

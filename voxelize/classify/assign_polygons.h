@@ -10,4 +10,7 @@ namespace flexel::voxelize {
 // the voxel is empty the fullest piece of the 26 around.
 void trace_missing(const PartMesh& mesh, Voxels& voxels);
 
+// Adds those of certain polygons (ascending).
+void trace_polygons(const PartMesh& mesh, const std::vector<std::uint32_t>& polygons, Voxels& voxels);
+
 }  // namespace flexel::voxelize

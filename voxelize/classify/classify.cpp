@@ -24,7 +24,8 @@ struct Bins {
   std::vector<std::uint32_t> triangles;
 };
 
-Bins bin_triangles(const PartMesh& mesh) {
+// Of the slabs in `box`, where one is given.
+Bins bin_triangles(const PartMesh& mesh, const std::optional<VoxelBox>& box) {
   const std::size_t n = mesh.corners.size();
   std::vector<std::array<int, 2>> range(n);
   parallel_for_each(n, [&](std::size_t t) {
@@ -33,8 +34,18 @@ Bins bin_triangles(const PartMesh& mesh) {
         std::minmax({mesh.vertices[c[0]].z(), mesh.vertices[c[1]].z(), mesh.vertices[c[2]].z()});
     range[t] = {floor_int(low), floor_int(high)};
   });
-  int k_begin = range.empty() ? 0 : range[0][0], k_last = k_begin - 1;
+  if (box)
+    for (auto& [low, high] : range) {  // where nothing is left, high is less than low
+      low = std::max(low, box->lower[2]);
+      high = std::min(high, box->upper[2] - 1);
+    }
+  int k_begin = 0, k_last = -1;
   for (const auto& [low, high] : range) {
+    if (high < low) continue;
+    if (k_last < k_begin) {
+      k_begin = low;
+      k_last = high;
+    }
     k_begin = std::min(k_begin, low);
     k_last = std::max(k_last, high);
   }
@@ -78,10 +89,13 @@ struct Box2 {
 // Fills one slab.
 class SlabBuilder {
  public:
-  SlabBuilder(const PartMesh& mesh, const ClassifyOptions& options) : mesh_(mesh), options_(options) {}
+  // `window`: of each slab, where there is a box.
+  SlabBuilder(const PartMesh& mesh, const ClassifyOptions& options, SlabWindow window)
+      : mesh_(mesh), options_(options), window_(std::move(window)) {}
 
   void build(int k, std::span<const std::uint32_t> triangles, Slab& slab) {
     clip(k, triangles);
+    if (options_.box) return sweep_window(k, slab);
     if (records_.empty()) return;
     slab.j_begin = records_.front().j;
     for (auto row = records_.begin(); row != records_.end();) {
@@ -89,7 +103,8 @@ class SlabBuilder {
           std::find_if(row, records_.end(), [&](const Record& record) { return record.j != row->j; });
       while (slab.j_begin + static_cast<int>(slab.row_begin.size()) <= row->j)
         slab.row_begin.push_back(static_cast<std::uint32_t>(slab.pieces.size()));
-      sweep_row({row, row_end}, k, slab);
+      const int winding = sweep_row({row, row_end}, 0, k, slab);
+      if (winding != 0) throw std::logic_error("a row of voxels does not end outside the part");
       row = row_end;
     }
     slab.row_begin.push_back(static_cast<std::uint32_t>(slab.pieces.size()));
@@ -99,11 +114,43 @@ class SlabBuilder {
   // Records of the slab, by (j, i, triangle).
   void clip(int k, std::span<const std::uint32_t> triangles) {
     unsorted_.clear();
+    std::fill(window_.left.begin(), window_.left.end(), 0);
     for (const std::uint32_t t : triangles) {
       const Corners& c = mesh_.corners[t];
-      clip_to_slab({&mesh_.vertices[c[0]], &mesh_.vertices[c[1]], &mesh_.vertices[c[2]]}, t, k, unsorted_);
+      const TrianglePoints points = {&mesh_.vertices[c[0]], &mesh_.vertices[c[1]], &mesh_.vertices[c[2]]};
+      if (options_.box)
+        clip_to_window(points, t, k, window_, unsorted_);
+      else
+        clip_to_slab(points, t, k, unsorted_);
     }
     sort_by_voxel();
+  }
+
+  // Every row of the window: one that no triangle passes through may lie inside the part.
+  void sweep_window(int k, Slab& slab) {
+    slab.j_begin = window_.j_begin;
+    auto row = records_.begin();
+    for (std::size_t n = 0; n < window_.left.size(); ++n) {
+      slab.row_begin.push_back(static_cast<std::uint32_t>(slab.pieces.size()));
+      const int j = window_.j_begin + static_cast<int>(n);
+      const auto row_end =
+          std::find_if(row, records_.end(), [&](const Record& record) { return record.j != j; });
+      const std::span<const Record> records(row, row_end);
+      if (!records.empty() && window_.left[n] > 0) add_full(window_.i_begin, records.front().i, slab);
+      const int winding = sweep_row(records, window_.left[n], k, slab);
+      if (winding > 0)
+        add_full(records.empty() ? window_.i_begin : records.back().i + 1, window_.i_end, slab);
+      row = row_end;
+    }
+    slab.row_begin.push_back(static_cast<std::uint32_t>(slab.pieces.size()));
+  }
+
+  void add_full(int i_begin, int i_end, Slab& slab) const {
+    for (int i = i_begin; i < i_end; ++i)
+      slab.pieces.push_back({.fill = 1,
+                             .i = i,
+                             .corners = 0xff,
+                             .flags = options_.with_centres ? kContainsCentre : PieceFlag{}});
   }
 
   // Triangles come in ascending order, and both counting sorts keep the order of what they find equal.
@@ -143,8 +190,8 @@ class SlabBuilder {
     for (const Record& record : from) to[next_[static_cast<std::size_t>(key(record))]++] = record;
   }
 
-  void sweep_row(std::span<const Record> row, int k, Slab& slab) {
-    int winding = 0;
+  // `winding`: at the lattice point before the first record; returned is that after the last.
+  int sweep_row(std::span<const Record> row, int winding, int k, Slab& slab) {
     for (std::size_t n = 0; n < row.size();) {
       std::size_t end = n + 1;
       while (end < row.size() && row[end].i == row[n].i) ++end;
@@ -152,15 +199,10 @@ class SlabBuilder {
       const VoxelRecords voxel{&mesh_, records, row[n].i, row[n].j, k, corner_windings(winding, records)};
       add_voxel(voxel, slab);
       winding = voxel.winding[1];
-      if (winding > 0 && end < row.size())
-        for (int i = row[n].i + 1; i < row[end].i; ++i)
-          slab.pieces.push_back({.fill = 1,
-                                 .i = i,
-                                 .corners = 0xff,
-                                 .flags = options_.with_centres ? kContainsCentre : PieceFlag{}});
+      if (winding > 0 && end < row.size()) add_full(row[n].i + 1, row[end].i, slab);
       n = end;
     }
-    if (winding != 0) throw std::logic_error("a row of voxels does not end outside the part");
+    return winding;
   }
 
   void add_voxel(const VoxelRecords& voxel, Slab& slab) {
@@ -194,6 +236,7 @@ class SlabBuilder {
       else
         moments_.find(voxel, found, first, slab);
     }
+    if (options_.counted && !options_.counted->holds(voxel.i, voxel.j, voxel.k)) return;
     slab.split_voxels += found.count > 1;
     slab.undecided_voxels += found.undecided && !found.overlapping;
     slab.overlapping_voxels += found.overlapping;
@@ -226,22 +269,41 @@ class SlabBuilder {
 
   const PartMesh& mesh_;
   const ClassifyOptions& options_;
+  SlabWindow window_;
   PieceFinder finder_;
   MomentFinder moments_;
   std::vector<Record> unsorted_, records_;
   std::vector<std::uint32_t> next_;
 };
 
+// The rows and columns of the box that the mesh reaches.
+SlabWindow window_of(const PartMesh& mesh, const std::optional<VoxelBox>& box) {
+  SlabWindow window;
+  if (!box || mesh.vertices.empty()) return window;
+  Vec3 low = mesh.vertices[0], high = low;
+  for (const Vec3& vertex : mesh.vertices) {
+    low = low.cwiseMin(vertex);
+    high = high.cwiseMax(vertex);
+  }
+  window.i_begin = std::max(box->lower[0], floor_int(low.x()));
+  window.i_end = std::max(window.i_begin, std::min(box->upper[0], floor_int(high.x()) + 1));
+  window.j_begin = std::max(box->lower[1], floor_int(low.y()));
+  const int j_end = std::min(box->upper[1], floor_int(high.y()) + 1);
+  window.left.assign(static_cast<std::size_t>(std::max(0, j_end - window.j_begin)), 0);
+  return window;
+}
+
 }  // namespace
 
 Voxels classify_closed(const PartMesh& mesh, const ClassifyOptions& options) {
-  const Bins bins = bin_triangles(mesh);
+  const Bins bins = bin_triangles(mesh, options.box);
+  const SlabWindow window = window_of(mesh, options.box);
   Voxels voxels;
   voxels.k_begin = bins.k_begin;
   voxels.slabs.resize(bins.begin.size() - 1);
   ShareCounter done(voxels.slabs.size());
   parallel_chunks(voxels.slabs.size(), 2, [&](std::size_t begin, std::size_t end) {
-    SlabBuilder builder(mesh, options);
+    SlabBuilder builder(mesh, options, window);
     for (std::size_t s = begin; s < end; ++s)
       builder.build(bins.k_begin + static_cast<int>(s),
                     {bins.triangles.data() + bins.begin[s], bins.begin[s + 1] - bins.begin[s]},

@@ -145,14 +145,55 @@ Record make_record(const Polygon& polygon, std::uint32_t triangle, int i, int j,
   return record;
 }
 
+// A cut that would keep everything is left out.
+const Polygon& cut_to_slab(const Polygon& whole, int k, Polygon& slab) {
+  const auto [k_begin, k_last] = band_range(whole, 2);
+  if (k_begin == k_last) return whole;
+  cut_band(whole, 2, k, slab);
+  return slab;
+}
+
+// Change of the winding number along the row's lattice line, y = j and z = k, before x = `i`: that of the voxels' edges
+// there, for the polygon's corners on the line are theirs.
+int winding_before(const Polygon& in_row, int i) {
+  int change = 0;
+  std::uint16_t before = in_row.side[in_row.count - 1];
+  for (int v = 0; v < in_row.count; ++v) {
+    const std::uint16_t side = in_row.side[v];
+    if (before > kTriangleEdges && side > kTriangleEdges && in_row.corner[v][0] < i) {
+      const EdgeCrossing at = edge_crossing(before, side);
+      if (at.edge == kAlongX) change += at.sign;
+    }
+    before = side;
+  }
+  return change;
+}
+
+// Voxels that a row's polygon reaches, and which of them are wanted.
+struct VoxelRange {
+  int begin = 0, last = 0, first_wanted = 0, last_wanted = 0;
+};
+
+void add_voxels(const Polygon& in_row, std::uint32_t triangle, const VoxelRange& range, int j, int k,
+                std::vector<Record>& records) {
+  if (range.first_wanted > range.last_wanted) return;
+  if (range.begin == range.last) {
+    records.push_back(make_record(in_row, triangle, range.begin, j, k));
+    return;
+  }
+  Polygon voxel;
+  for (int i = range.first_wanted; i <= range.last_wanted; ++i) {
+    cut_band(in_row, 0, i, voxel);
+    if (voxel.count > 0) records.push_back(make_record(voxel, triangle, i, j, k));
+  }
+}
+
 }  // namespace
 
 void clip_to_slab(const TrianglePoints& points, std::uint32_t triangle, int k, std::vector<Record>& records) {
   const Polygon whole = whole_triangle(points);
-  Polygon slab, row, voxel;  // a cut that would keep everything is left out
-  const auto [k_begin, k_last] = band_range(whole, 2);
-  if (k_begin != k_last) cut_band(whole, 2, k, slab);
-  const Polygon& in_slab = k_begin != k_last ? slab : whole;
+  Polygon slab, row;
+  const Polygon& in_slab = cut_to_slab(whole, k, slab);
   if (in_slab.count == 0) return;
   const auto [j_begin, j_last] = band_range(in_slab, 1);
   for (int j = j_begin; j <= j_last; ++j) {
@@ -160,14 +201,28 @@ void clip_to_slab(const TrianglePoints& points, std::uint32_t triangle, int k, s
     const Polygon& in_row = j_begin != j_last ? row : in_slab;
     if (in_row.count == 0) continue;
     const auto [i_begin, i_last] = band_range(in_row, 0);
-    if (i_begin == i_last) {
-      records.push_back(make_record(in_row, triangle, i_begin, j, k));
-      continue;
-    }
-    for (int i = i_begin; i <= i_last; ++i) {
-      cut_band(in_row, 0, i, voxel);
-      if (voxel.count > 0) records.push_back(make_record(voxel, triangle, i, j, k));
-    }
+    add_voxels(in_row, triangle, {i_begin, i_last, i_begin, i_last}, j, k, records);
+  }
+}
+
+void clip_to_window(const TrianglePoints& points, std::uint32_t triangle, int k, SlabWindow& window,
+                    std::vector<Record>& records) {
+  const Polygon whole = whole_triangle(points);
+  Polygon slab, row;
+  const Polygon& in_slab = cut_to_slab(whole, k, slab);
+  if (in_slab.count == 0) return;
+  const auto [j_begin, j_last] = band_range(in_slab, 1);
+  const int j_end = window.j_begin + static_cast<int>(window.left.size());
+  for (int j = std::max(j_begin, window.j_begin); j <= std::min(j_last, j_end - 1); ++j) {
+    if (j_begin != j_last) cut_band(in_slab, 1, j, row);
+    const Polygon& in_row = j_begin != j_last ? row : in_slab;
+    if (in_row.count == 0) continue;
+    const auto [i_begin, i_last] = band_range(in_row, 0);
+    if (i_begin < window.i_begin)
+      window.left[static_cast<std::size_t>(j - window.j_begin)] += winding_before(in_row, window.i_begin);
+    add_voxels(in_row, triangle,
+               {i_begin, i_last, std::max(i_begin, window.i_begin), std::min(i_last, window.i_end - 1)}, j, k,
+               records);
   }
 }
 

@@ -69,6 +69,16 @@ using TrianglePoints = std::array<const Vec3*, 3>;  // lattice coordinates
 // Appends one record for each voxel of slab k (k <= z < k + 1) that the triangle passes through.
 void clip_to_slab(const TrianglePoints& points, std::uint32_t triangle, int k, std::vector<Record>& records);
 
+// Of a slab the voxels i_begin <= i < i_end of rows j_begin <= j < j_begin + left.size().
+struct SlabWindow {
+  int i_begin = 0, i_end = 0, j_begin = 0;
+  std::vector<int>
+      left;  // (rows) change of the winding number along the row's lattice line up to x = i_begin
+};
+// Likewise, for those voxels alone; what the triangle does to the lattice lines before them is added to `window.left`.
+void clip_to_window(const TrianglePoints& points, std::uint32_t triangle, int k, SlabWindow& window,
+                    std::vector<Record>& records);
+
 // The part of the triangle inside voxel (i, j, k).
 [[nodiscard]] Polygon clip_to_voxel(const TrianglePoints& points, int i, int j, int k);
 

@@ -71,6 +71,14 @@ struct Voxels {
   }
 };
 
+// Voxels lower <= (i, j, k) < upper.
+struct VoxelBox {
+  Index3 lower{}, upper{};
+  [[nodiscard]] bool holds(int i, int j, int k) const {
+    return i >= lower[0] && i < upper[0] && j >= lower[1] && j < upper[1] && k >= lower[2] && k < upper[2];
+  }
+};
+
 // Fills first_piece.
 void number_pieces(Voxels& voxels);
 

@@ -16,14 +16,29 @@
 namespace flexel::voxelize {
 namespace {
 
-constexpr std::uint32_t kNoCell = 0xffffffffu;
-constexpr double kNothing = 1e-9;  // fill: the rim of a face that lies on a lattice plane, no sliver
+constexpr std::uint32_t kNoCell = 0xffffffffu, kElsewhere = kLeftOut;
 
 // Pieces that become something, numbered on from `first`.
 struct KeptPieces {
-  std::vector<std::uint32_t> number;  // (pieces) or kNoCell
+  std::vector<std::uint32_t> number;  // (pieces) or kNoCell, or kElsewhere
   std::size_t count = 0;
 };
+
+// Numbers those that lie outside the box as kElsewhere, and the others on.
+void leave_out(const Voxels& voxels, const VoxelBox& held, std::uint32_t first, KeptPieces& kept) {
+  std::uint32_t next = first;
+  for (std::size_t s = 0; s < voxels.slabs.size(); ++s) {
+    const Slab& slab = voxels.slabs[s];
+    const int k = voxels.k_begin + static_cast<int>(s);
+    for (int j = slab.j_begin; j < slab.j_begin + slab.rows(); ++j)
+      for (std::uint32_t p = slab.row_begin[j - slab.j_begin]; p < slab.row_begin[j - slab.j_begin + 1];
+           ++p) {
+        std::uint32_t& number = kept.number[voxels.first_piece[s] + p];
+        if (number != kNoCell) number = held.holds(slab.pieces[p].i, j, k) ? next++ : kElsewhere;
+      }
+  }
+  kept.count = next - first;
+}
 
 template <class Keep>
 KeptPieces number_kept(const Voxels& voxels, const Keep& keep, std::uint32_t first) {
@@ -61,13 +76,7 @@ bool has_centre(const Piece& piece) {
 template <class Keep>
 AssembledPart count_slab(const Slab& slab, const Keep& keep) {
   AssembledPart result;
-  for (const Piece& piece : slab.pieces) {
-    if (keep(piece))
-      result.volume += piece.fill;
-    else if (std::abs(piece.fill) > kNothing)
-      result.dropped_volume += piece.fill;
-    result.dropped_cells += !keep(piece) && piece.fill > kNothing;
-  }
+  for (const Piece& piece : slab.pieces) add_piece(piece.fill, keep(piece), result);
   return result;
 }
 
@@ -93,21 +102,6 @@ void append(std::vector<Value>&& from, std::vector<Value>& to) {
     return;
   }
   to.insert(to.end(), from.begin(), from.end());
-}
-
-void append_elements(std::vector<Index3>&& index, std::vector<std::uint16_t>&& number, const Part& part,
-                     Body& body) {
-  const std::size_t first = body.rest.size(), n = index.size();
-  const Vec3 shift = Vec3::Constant(part.placement == Placement::centre ? .5 : 0);
-  append(std::move(index), body.lattice_index);
-  append(std::move(number), body.piece);
-  resize_touched(body.rest, first + n);
-  resize_touched(body.position, first + n);
-  parallel_for_each(n, [&](std::size_t e) {
-    const Index3& at = body.lattice_index[first + e];
-    body.position[first + e] = body.rest[first + e] =
-        part.lattice.to_world(Vec3(at[0], at[1], at[2]) + shift);
-  });
 }
 
 // The row of voxels (j, k) and the number of its first piece.
@@ -155,7 +149,8 @@ void for_meeting(const Voxels& voxels, const PlacedPiece& at, const Visit& visit
     }
 }
 
-// The kept piece with most fill within two steps through dropped pieces; kNoCell where there is none.
+// The kept piece with most fill within two steps through dropped pieces; kNoCell where there is none, kElsewhere where
+// its cell is not here.
 std::uint32_t substitute(const Voxels& voxels, const PlacedPiece& dropped,
                          const std::vector<std::uint32_t>& cell) {
   std::uint32_t best = kNoCell;
@@ -194,7 +189,7 @@ void trace_slab(const Voxels& voxels, std::size_t s, const std::vector<std::uint
       known = trace.piece;
       number = known_substitute;
     }
-    if (number != kNoCell) pairs.push_back({trace.polygon, number});
+    if (number != kNoCell && number != kElsewhere) pairs.push_back({trace.polygon, number});
   }
 }
 
@@ -214,24 +209,54 @@ void append_cells(const Voxels& voxels, const KeptPieces& kept, std::uint32_t fi
       [&](std::size_t s) {
         const std::uint32_t* cell = &kept.number[voxels.first_piece[s]];
         for (const Piece& piece : voxels.slabs[s].pieces) {
-          if (*cell != kNoCell) body.fill[*cell] = piece.fill;
+          if (*cell != kNoCell && *cell != kElsewhere) body.fill[*cell] = piece.fill;
           ++cell;
         }
       },
       2);
 }
 
+// Leaves out elements that no cell here has, and numbers the others over the whole lattice.
+void drop_unused(LatticeElements& elements, PartSlice& slice) {
+  std::vector<bool> used(elements.index.size(), false);
+  for (const auto& of_piece : elements.of_piece)
+    for (const std::uint32_t e : of_piece) used[e] = true;
+  std::vector<std::uint32_t> number(elements.index.size(), kNoElement);
+  std::vector<std::int64_t> next_point =
+      slice.plane_point;  // elements of a plane are numbered in their order
+  std::uint32_t next = 0;
+  slice.points.reserve(slice.points.size() +
+                       static_cast<std::size_t>(std::count(used.begin(), used.end(), true)));
+  for (std::size_t e = 0; e < used.size(); ++e) {
+    const auto plane = static_cast<std::size_t>(elements.index[e][slice.axis] - slice.first_plane);
+    if (plane < next_point.size()) ++next_point[plane];
+    if (!used[e]) continue;
+    slice.points.push_back(next_point[plane] - 1);
+    number[e] = next;
+    elements.index[next] = elements.index[e];
+    elements.number[next++] = elements.number[e];
+  }
+  elements.index.resize(next);
+  elements.number.resize(next);
+  for (auto& of_piece : elements.of_piece)
+    for (std::uint32_t& e : of_piece) e = number[e];
+}
+
 AssembledPart assemble_corners(const Voxels& voxels, const Part& part, Body& body,
-                               PolygonCells& polygon_cells) {
+                               PolygonCells& polygon_cells, PartSlice* slice) {
   const auto first_element = static_cast<std::uint32_t>(body.element_count());
   const auto first_cell = static_cast<std::uint32_t>(body.cell_count());
   const auto keep = [&](const Piece& piece) { return has_cell(voxels, piece); };
   AssembledPart result = count_volumes(voxels, keep);
-  const KeptPieces kept = number_kept(voxels, keep, first_cell);
+  KeptPieces kept = number_kept(voxels, keep, first_cell);
+  if (slice != nullptr) leave_out(voxels, slice->held, first_cell, kept);
   result.cells = kept.count;
   LatticeElements elements = make_elements(voxels, kept.number, first_cell, kept.count);
+  if (slice != nullptr) drop_unused(elements, *slice);
   result.elements = elements.index.size();
-  append_elements(std::move(elements.index), std::move(elements.number), part, body);
+  append(std::move(elements.index), body.lattice_index);
+  append(std::move(elements.number), body.piece);
+  if (slice == nullptr) place_elements(part, body);
   append_cells(voxels, kept, first_element, std::move(elements.of_piece), body);
   const std::size_t first_list = polygon_cells.size();
   polygon_cells.resize(first_list + voxels.slabs.size());
@@ -286,7 +311,9 @@ AssembledPart assemble_centres(const Voxels& voxels, const Part& part, Body& bod
   result.volume = static_cast<double>(index.size());
   result.dropped_volume = 0;
   std::vector<std::uint16_t> pieces(index.size(), 0);
-  append_elements(std::move(index), std::move(pieces), part, body);
+  append(std::move(index), body.lattice_index);
+  append(std::move(pieces), body.piece);
+  place_elements(part, body);
   body.connections.resize(first, 0);
   body.connections.insert(body.connections.end(), connections.begin(), connections.end());
   return result;
@@ -294,21 +321,43 @@ AssembledPart assemble_centres(const Voxels& voxels, const Part& part, Body& bod
 
 }  // namespace
 
-AssembledPart assemble_part(const Voxels& voxels, const Part& part, Body& body, PolygonCells& polygon_cells) {
+void place_elements(const Part& part, Body& body) {
+  const std::size_t first = body.rest.size(), all = body.lattice_index.size();
+  const Vec3 shift = Vec3::Constant(part.placement == Placement::centre ? .5 : 0);
+  resize_touched(body.rest, all);
+  resize_touched(body.position, all);
+  parallel_for_each(all - first, [&](std::size_t e) {
+    const Index3& at = body.lattice_index[first + e];
+    body.position[first + e] = body.rest[first + e] =
+        part.lattice.to_world(Vec3(at[0], at[1], at[2]) + shift);
+  });
+}
+
+void add_piece(double fill, bool kept, AssembledPart& found) {
+  constexpr double kNothing = 1e-9;  // the rim of a face that lies on a lattice plane, no sliver
+  if (kept)
+    found.volume += fill;
+  else if (std::abs(fill) > kNothing)
+    found.dropped_volume += fill;
+  found.cells += kept;
+  found.dropped_cells += !kept && fill > kNothing;
+}
+
+AssembledPart assemble_part(const Voxels& voxels, const Part& part, Body& body, PolygonCells& polygon_cells,
+                            PartSlice* slice) {
   Part placed = part;
   placed.element_begin = static_cast<std::uint32_t>(body.element_count());
   placed.cell_begin = static_cast<std::uint32_t>(body.cell_count());
   const AssembledPart result = part.placement == Placement::corner
-                                   ? assemble_corners(voxels, part, body, polygon_cells)
+                                   ? assemble_corners(voxels, part, body, polygon_cells, slice)
                                    : assemble_centres(voxels, part, body);
-  placed.element_end = static_cast<std::uint32_t>(body.element_count());
+  placed.element_end = static_cast<std::uint32_t>(body.lattice_index.size());
   placed.cell_end = static_cast<std::uint32_t>(body.cell_count());
   body.parts.push_back(placed);
   return result;
 }
 
-void set_surface_cells(const PolygonCells& polygon_cells, Body& body) {
-  const std::size_t polygons = body.surface.polygon_count();
+void set_surface_cells(const PolygonCells& polygon_cells, std::size_t polygons, Body& body) {
   Buckets<std::uint32_t> cells = sort_into_buckets<std::uint32_t>(polygons, [&](const auto& use) {
     for (const std::vector<PolygonCell>& list : polygon_cells)
       for (const PolygonCell& pair : list) use(pair.polygon, pair.cell);

@@ -25,7 +25,7 @@ class Entries {
   [[nodiscard]] std::size_t of(std::size_t piece) const {
     if (number_ == nullptr) return piece;
     const std::uint32_t number = (*number_)[piece];
-    return number == kNoElement ? kNoEntry : number - first_;
+    return number >= kLeftOut ? kNoEntry : number - first_;
   }
   [[nodiscard]] std::size_t count() const { return count_; }
 

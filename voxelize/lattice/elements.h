@@ -23,11 +23,12 @@ struct LatticeElements {
                                                        // kNoElement where a dropped piece touches no kept one
 };
 constexpr std::uint32_t kNoElement = 0xffffffffu;
+constexpr std::uint32_t kLeftOut = 0xfffffffeu;  // of a piece whose cell is not wanted
 
 [[nodiscard]] LatticeElements make_elements(const Voxels& voxels);
 
 // The same, with entries of `of_piece` for some pieces only: `number` has one entry for each piece, `first`
-// to `first` + `count` - 1 for those wanted, in order, and kNoElement for the others.
+// to `first` + `count` - 1 for those wanted, in order, and kNoElement or kLeftOut for the others.
 [[nodiscard]] LatticeElements make_elements(const Voxels& voxels, const std::vector<std::uint32_t>& number,
                                             std::uint32_t first, std::size_t count);
 

@@ -65,6 +65,7 @@ struct VoxelizeResult {
   std::vector<VoxelizedPart> parts;
   std::vector<PartPair> pairs;
   double size = 0;               // m, asked for, or chosen for the count
+  bool with_moments = false;
   double simulation_memory = 0;  // bytes that simulate will need at equilibrium, estimated
 };
 
