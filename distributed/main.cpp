@@ -17,8 +17,10 @@
 #include "distributed/checkpoint.h"
 #include "distributed/petsc.h"
 #include "distributed/refusals.h"
+#include "distributed/result_in_pieces.h"
 #include "distributed/team.h"
 #include "formats/lattice/body_file.h"
+#include "formats/pieces/join.h"
 #include "simulate/answer.h"
 #include "simulate/matter/stress.h"
 #include "simulate/scene/strength.h"
@@ -41,8 +43,10 @@ struct Arguments {
 void declare(CommandLine& app, Arguments& arguments) {
   arguments.options.threads = 1;
   app.add_option("scene", arguments.scene, "Scene file (TOML; docs/reference/scene.md gives every key)");
-  app.add_option("body", arguments.body, "Body file; rank 0 reads it and cuts it into a piece for each rank");
-  app.add_option("-o,--output", arguments.output, "Deformed body (.vtu)");
+  app.add_option(
+      "body", arguments.body,
+      "Body file, or a list of pieces (.pvtu); rank 0 reads it and cuts it anew, a slab for each rank");
+  app.add_option("-o,--output", arguments.output, "Deformed body (.vtu), in pieces (.pvtu) where it came so");
   app.add_option("--petsc", arguments.petsc, "Options of PETSc's, for example \"-ksp_view\"");
   app.add_option("--checkpoint", arguments.options.checkpoint,
                  "Write every load step that ends in equilibrium to this file, in place of the one before");
@@ -70,6 +74,10 @@ void check_files(const Arguments& arguments) {
         "a scene and a body are needed, for example mpirun -n 4 flexel-simulate-mpi scene.toml "
         "body.vtu -o out.vtu; --help shows what is accepted");
   if (arguments.output.empty()) throw InputError("-o is needed, for example -o out.vtu");
+  if (distributed::is_piece_list(arguments.body) != distributed::is_piece_list(arguments.output))
+    throw InputError(arguments.output,
+                     "pieces (.pvtu) come out as pieces, and a whole body (.vtu) as a whole one: give -o the "
+                     "same ending as the body");
   for (const std::string& name : {arguments.scene, arguments.body, arguments.output})
     if (name == "-") throw InputError("\"-\": ranks have no stdin and stdout of their own; give files");
   check_outputs({{arguments.output, true},
@@ -82,7 +90,19 @@ void check_files(const Arguments& arguments) {
 }
 
 std::string failed_name(const std::string& output) {
-  return (extension(output) == "vtu" ? output.substr(0, output.size() - 4) : output) + ".failed.vtu";
+  const std::string ending = extension(output);
+  const bool known = ending == "vtu" || ending == "pvtu";
+  return (known ? output.substr(0, output.size() - 1 - ending.size()) : output) + ".failed.vtu";
+}
+
+// What is written before the first of it appears.
+std::vector<std::string> names_of_results(const Arguments& arguments,
+                                          const std::optional<PieceFiles>& pieces) {
+  std::vector<std::string> names = {arguments.output, arguments.summary};
+  if (!pieces) return names;
+  names.push_back(shared_surface_path(arguments.output));
+  for (std::uint32_t p = 0; p < pieces->files.size(); ++p) names.push_back(piece_path(arguments.output, p));
+  return names;
 }
 
 LoadStepHooks hooks_of(const Arguments& arguments, const Scene& scene, const Body& body,
@@ -117,10 +137,12 @@ void lead(Arguments& arguments, distributed::Leader& leader) {
   check_files(arguments);
   const Scene scene = read_scene(arguments.scene);
   distributed::refuse_unsupported(scene);
-  Body body = read_body(arguments.body);
+  std::optional<PieceFiles> pieces;
+  if (distributed::is_piece_list(arguments.body)) pieces = read_piece_list(arguments.body);
+  Body body = pieces ? join_pieces(*pieces) : read_body(arguments.body);
   erase_stress_columns(body);
   distributed::refuse_unsupported(scene, body);
-  OutputsTogether outputs({arguments.output, arguments.summary});
+  OutputsTogether outputs(names_of_results(arguments, pieces));
   leader.give(scene);
   options.hooks = std::make_shared<const LoadStepHooks>(hooks_of(arguments, scene, body, leader));
   options.checkpoint.clear();  // that of timed runs
@@ -136,7 +158,10 @@ void lead(Arguments& arguments, distributed::Leader& leader) {
   progress.stage("write");
   BodyFileOptions file_options;
   file_options.compress = arguments.compress;
-  write_body(body, arguments.output, file_options);
+  if (pieces)
+    distributed::write_in_pieces(body, *pieces, arguments.output, arguments.compress);
+  else
+    write_body(body, arguments.output, file_options);
   if (!arguments.summary.empty()) write_text(summary(), arguments.summary);
   outputs.appear();
   progress.finish();
@@ -160,7 +185,8 @@ int run(int argc, char** argv, distributed::Leader& leader) {
   Arguments arguments;
   declare(app, arguments);
   if (!parse_arguments(app, argc, argv)) return kExitDone;
-  leader.give_options(arguments.petsc, arguments.options.threads);
+  distributed::Session::check_options(arguments.petsc);
+  leader.give_threads(arguments.options.threads);
   lead(arguments, leader);
   return kExitDone;
 }
@@ -168,7 +194,7 @@ int run(int argc, char** argv, distributed::Leader& leader) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const flexel::distributed::Session session(argv);
+  const flexel::distributed::Session session(argc, argv);
   int code = 0;
   if (flexel::distributed::rank() == 0) {
     flexel::distributed::Leader leader;

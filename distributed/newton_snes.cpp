@@ -26,6 +26,7 @@ constexpr double kFirstForcing = 1e-4, kLargestForcing = 0.1, kLooseForcing = 1e
 constexpr double kKeepTangentBelow = 1e-3, kKeepLastTangentBelow = 1e-2;
 constexpr double kArmijo = 1e-4, kSmallestStep = 1.0 / 4096, kShrunk = 0.25;
 constexpr int kMaxCgIterations = 3000, kStepsToShrink = 8;
+constexpr PetscInt kCoarsestUnknowns = 1000;  // which are factorised
 constexpr PetscInt kAskEvery = 8;  // iterations of conjugate gradients between two looks at the clock
 
 double norm(Vec vector) {
@@ -114,6 +115,8 @@ NewtonSnes::NewtonSnes(PieceSystem& system) : system_(system) {
   PC preconditioner;
   ok(KSPGetPC(solver, &preconditioner));
   ok(PCSetType(preconditioner, PCGAMG));
+  ok(PCGAMGSetCoarseEqLim(preconditioner, kCoarsestUnknowns));
+  ok(PCGAMGSetReuseInterpolation(preconditioner, PETSC_TRUE));
   try {
     ok(SNESSetFromOptions(snes_));
   } catch (const std::runtime_error& error) {

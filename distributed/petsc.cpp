@@ -10,6 +10,8 @@
 #include <set>
 #include <sstream>
 #include <stdexcept>
+#include <string_view>
+#include <vector>
 
 #include "base/error.h"
 
@@ -54,11 +56,24 @@ void ok(PetscErrorCode code) {
   throw std::runtime_error(said.empty() ? "PETSc or MPI failed with code " + std::to_string(code) : said);
 }
 
-Session::Session(char** argv) {
-  int one = 1;
-  char* name[] = {argv[0], nullptr};  // the arguments are ours
-  char** names = name;
-  ok(PetscInitialize(&one, &names, nullptr, nullptr));
+Session::Session(int argc, char** argv) {
+  // Ours are the arguments; PETSc's own are in one of them. Some of those count only from the beginning (-log_view).
+  const std::string_view name = "--petsc";
+  std::vector<std::string> words = {argv[0]};
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    const bool joined = word.starts_with("--petsc=");
+    if (!joined && (word != name || i + 1 == argc)) continue;
+    std::istringstream text(std::string(joined ? word.substr(name.size() + 1) : argv[i + 1]));
+    std::string each;
+    while (text >> each) words.push_back(each);
+  }
+  std::vector<char*> pointers;
+  for (std::string& word : words) pointers.push_back(word.data());
+  int count = static_cast<int>(pointers.size());
+  pointers.push_back(nullptr);
+  char** arguments = pointers.data();
+  ok(PetscInitialize(&count, &arguments, nullptr, nullptr));
   ok(PetscPopSignalHandler());
   ok(PetscPushErrorHandler(keep_error, nullptr));
 }
@@ -73,7 +88,7 @@ void Session::abort(int code) {
   std::_Exit(code);
 }
 
-void Session::set_options(const std::string& text) {
+void Session::check_options(const std::string& text) {
   std::istringstream words(text);
   std::string word;
   while (words >> word)
@@ -83,7 +98,6 @@ void Session::set_options(const std::string& text) {
     throw InputError("--petsc: \"" + text +
                      "\" names no option; options of PETSc begin with \"-\", for example --petsc "
                      "\"-ksp_view\"");
-  ok(PetscOptionsInsertString(nullptr, text.c_str()));
 }
 
 std::string Session::unused_options() {

@@ -42,12 +42,13 @@ using Numbering = Owned<ISLocalToGlobalMapping, ISLocalToGlobalMappingDestroy>;
 // MPI and PETSc, while it lives.
 class Session {
  public:
-  explicit Session(char** argv);
+  // With what --petsc gives of PETSc's options, "-ksp_view -pc_gamg_threshold 0.02"; they go before our own.
+  Session(int argc, char** argv);
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
-  // "-ksp_view -pc_gamg_threshold 0.02": options of PETSc's, which go before our own.
-  static void set_options(const std::string& text);
+  // Throws InputError where `text` names none.
+  static void check_options(const std::string& text);
   // Those that were given and that nothing asked for.
   [[nodiscard]] static std::string unused_options();
   // Ends every rank at once.

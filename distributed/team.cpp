@@ -30,7 +30,7 @@ using simulate::NewtonProgress;
 using simulate::Scene;
 using simulate::State;
 
-enum class Order : std::uint8_t { options, scene, begin, solve, drop, uses, end };
+enum class Order : std::uint8_t { threads, scene, begin, solve, drop, uses, end };
 
 bool at_work = false;
 double most_cells = 0;  // of a piece of this rank
@@ -215,8 +215,9 @@ class Follower {
  public:
   void obey(Order order, std::span<const std::byte> more) {
     switch (order) {
-      case Order::options:
-        return take_options(more);
+      case Order::threads:
+        limit_.emplace(read_message<int>(more));
+        return;
       case Order::scene:
         return take_scene(more);
       case Order::begin:
@@ -241,14 +242,6 @@ class Follower {
   }
 
  private:
-  void take_options(std::span<const std::byte> more) {
-    std::string petsc;
-    int threads = 1;
-    Unpacker unpacker(more, "the message of the options", "is damaged");
-    visit_all(unpacker, petsc, threads);
-    Session::set_options(petsc);
-    limit_.emplace(threads);
-  }
   void take_scene(std::span<const std::byte> more) {
     std::string text, name;
     Unpacker unpacker(more, "the message of a scene", "is damaged");
@@ -263,9 +256,8 @@ class Follower {
 
 }  // namespace
 
-void Leader::give_options(const std::string& petsc, int threads) {
-  Session::set_options(petsc);
-  order(Order::options, message(petsc, threads));
+void Leader::give_threads(int threads) {
+  order(Order::threads, message(threads));
 }
 
 void Leader::give(const Scene& scene) {

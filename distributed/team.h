@@ -24,8 +24,8 @@ class Leader {
   // Empty where there are fewer cells than ranks, as on a coarse lattice: rank 0 solves that alone. Throws InputError for effects that
   // ranks do not share.
   [[nodiscard]] simulate::LoadStepSolver make_solver(simulate::Mechanics& mechanics);
-  // To all: PETSc's options and how many threads each uses; the scene, which is kept a reference to. Before make_solver().
-  void give_options(const std::string& petsc, int threads);
+  // To all: how many threads each uses; the scene, which is kept a reference to. Before make_solver().
+  void give_threads(int threads);
   void give(const simulate::Scene& scene);
   // What each rank has taken so far.
   [[nodiscard]] std::vector<RankUse> uses() const;

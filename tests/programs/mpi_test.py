@@ -41,7 +41,7 @@ where = { box = { min = ["-1 mm", "-1 mm", "-1 mm"], max = ["1 mm", "11 mm", "11
 [[move]]
 name = "led"
 where = { box = { min = ["39 mm", "-1 mm", "-1 mm"], max = ["41 mm", "11 mm", "11 mm"] } }
-displacement = ["free", "free", "15 mm"]
+displacement = ["free", "free", "8 mm"]
 [[load]]
 name = "aside"
 where = "zmax"
@@ -86,9 +86,9 @@ def close(one, other, share, what):
 def same_answer(ranks, text, *options):
     need_mpi()
     scene(text=text)
-    body("body.vtu", *options)
-    expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "one.vtu", "--summary", "one.json", "--threads", "1"))
-    expect_ok(mpi(ranks, "scene.toml", "body.vtu", "-o", "all.vtu", "--summary", "all.json"))
+    body()
+    expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "one.vtu", "--summary", "one.json", "--threads", "1", *options))
+    expect_ok(mpi(ranks, "scene.toml", "body.vtu", "-o", "all.vtu", "--summary", "all.json", *options))
     one, every = points("one.vtu"), points("all.vtu")
     close(every.point_data["displacement"], one.point_data["displacement"], 1e-8, "displacements")
     for column in ("von_mises", "principal_stresses"):
@@ -102,8 +102,9 @@ def same_answer(ranks, text, *options):
     close([load["force"] for load in a["loads"]], [load["force"] for load in b["loads"]], 1e-12, "loads")
     for key in ("elastic_energy", "largest_displacement", "mass", "largest_von_mises", "smallest_jacobian"):
         close([a[key]], [b[key]], 1e-7, key)
-    close([bar["value"] for bar in a["error_bars"]["bars"]], [bar["value"] for bar in b["error_bars"]["bars"]], 1e-7, "values of bars")
-    close([bar["half_width"] for bar in a["error_bars"]["bars"]], [bar["half_width"] for bar in b["error_bars"]["bars"]], 1e-5, "error bars")
+    if "error_bars" in b:
+        close([bar["value"] for bar in a["error_bars"]["bars"]], [bar["value"] for bar in b["error_bars"]["bars"]], 1e-7, "values of bars")
+        close([bar["bar"] for bar in a["error_bars"]["bars"]], [bar["bar"] for bar in b["error_bars"]["bars"]], 1e-6, "error bars")
     expect(a["relative_residual"] <= 1e-11 or a["newton_iterations"] > 1, "the tolerance holds on all ranks")
     return a, b
 
@@ -116,10 +117,40 @@ def test_two_ranks():
     same_answer(2, SMALL)
 
 
-def test_four_ranks_large_deflections():
-    every, one = same_answer(4, LARGE)
+def test_four_ranks():
+    same_answer(4, SMALL)
+
+
+def test_two_ranks_large_deflections():
+    every, one = same_answer(2, LARGE, "--no-estimate")
     expect(one["newton_iterations"] > 2, f"the case should not be linear: {one['newton_iterations']} iterations")
-    expect(every["largest_displacement"] > 0.01, "it should go past the thickness of the bar")
+    expect(every["largest_displacement"] > 0.008, "it should go near the thickness of the bar")
+
+
+def test_pieces_in_and_out():
+    """A list of pieces is the body that it was cut from, and its result in pieces that of the whole; as many pieces as there were, on any ranks."""
+    need_mpi()
+    scene(text=SMALL)
+    box("bar.stl")
+    expect_ok(run("flexel-voxelize", "bar.stl", "--size", "5 mm", "-o", "whole.vtu"))
+    expect_ok(run("flexel-voxelize", "bar.stl", "--size", "5 mm", "--pieces", "3", "-o", "parts.pvtu"))
+    expect_ok(mpi(2, "scene.toml", "whole.vtu", "-o", "bent.vtu", "--no-estimate"))
+    expect_ok(mpi(2, "scene.toml", "parts.pvtu", "-o", "bent.pvtu", "--no-estimate"))
+    whole, found = points("bent.vtu"), {}
+    for p in range(3):
+        piece = points(f"bent_{p}.vtu")
+        for at, moved, stress in zip(piece.point_data["rest"], piece.point_data["displacement"], piece.point_data["von_mises"]):
+            found.setdefault(tuple(round(1e6 * x) for x in at), []).append((moved, stress))
+    expect(len(found) == len(whole.points), f"{len(found)} places in pieces, {len(whole.points)} in the whole")
+    for at, moved, stress in zip(whole.point_data["rest"], whole.point_data["displacement"], whole.point_data["von_mises"]):
+        for piece_moved, piece_stress in found[tuple(round(1e6 * x) for x in at)]:
+            expect((piece_moved == moved).all() and piece_stress == stress, f"at {at}: {piece_moved} and {moved}")
+    expect_ok(run("flexel-map", "bent.pvtu", "-o", "pieces.stl"))
+    expect_ok(run("flexel-map", "bent.vtu", "-o", "whole.stl"))
+    expect(pathlib.Path("pieces.stl").read_bytes() == pathlib.Path("whole.stl").read_bytes(), "mapped from pieces and from the whole")
+    expect_error(mpi(2, "scene.toml", "parts.pvtu", "-o", "bent.vtu"), PROGRAM, "come out as pieces")
+    os.replace("bent_1.vtu", "parts_1.vtu")
+    expect_error(mpi(2, "scene.toml", "parts.pvtu", "-o", "again.pvtu"), PROGRAM, "piece 1", "another run")
 
 
 def test_options_of_petsc():
@@ -187,11 +218,10 @@ def ranks_of(process):
 
 def test_a_killed_rank_loses_one_load_step_at_most():
     need_mpi()
-    scene(text=LARGE + "load_steps = 40\n")
+    scene(text=LARGE + "load_steps = 8\n")
     body("body.vtu")
     command = ("scene.toml", "body.vtu", "-o", "out.vtu", "--no-estimate")
-    expect_ok(mpi(2, *command, "--summary", "whole.json"))
-    os.rename("out.vtu", "whole.vtu")
+    expect_ok(run("flexel-simulate", *command[:2], "-o", "whole.vtu", "--no-estimate", "--summary", "whole.json"))
     with open("told", "wb") as told:
         process = subprocess.Popen([*MPIRUN, "2", BIN / PROGRAM, *command, "--checkpoint", "steps"], stdout=told, stderr=told, env=ENVIRONMENT)
         ends = time.monotonic() + 60
