@@ -1,4 +1,5 @@
-// A grid of OpenVDB's with the distances to triangles, for the program flexel-meshes and the module flexel-distances.so.
+// A grid of OpenVDB's with the distances to triangles. Compiled once: the program flexel-meshes and the module
+// flexel-distances.so link the object.
 #pragma once
 #include <cstddef>
 #include <cstdint>

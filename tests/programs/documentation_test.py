@@ -1,5 +1,5 @@
-"""Every command in a ```sh block of README.md, docs/ and samples/README.md works as it stands; paper_test.py has docs/guide/paper.md and the
-pages of the samples.
+"""Every command in a ```sh block of README.md and docs/ works as it stands; paper_test.py has docs/guide/paper.md and the pages of the
+samples, tests/pipelines the scripts of samples/README.md.
 
 The blocks of a page run one after another in one shell (`bash -eu -o pipefail`), in a folder that looks like the repository after
 tools/demo: build/release/bin, samples and out/bracket.step are there. A block that is not to be run is fenced ```text.

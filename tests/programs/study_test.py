@@ -289,11 +289,11 @@ def test_calculix_stands_beside():
     """Its points are in the table, the plot and on the page, and on a plain box it agrees with Flexel."""
     need("gmsh", "ccx")
     box()
-    for budget in ("25 s", "70 s"):  # on a busy machine a run takes many times as long
+    for budget in ("16 s", "70 s"):  # on a busy machine a run takes many times as long
         result = expect_ok(run("flexel", "study", "box.stl", "--scene", scene(), "--budget", budget, "-o", "study", "--against", "calculix",
                                timeout=110))
         theirs = [r for r in rows_of() if r["sweep"] == "calculix" and r["status"] == "ok"]
-        if len({r["label"] for r in theirs}) >= 3:
+        if len({r["label"] for r in theirs}) >= 2:
             break
     expect(len({r["label"] for r in theirs}) >= 2, f"two meshes at least: {theirs} {result.err}")
     for row in theirs:
