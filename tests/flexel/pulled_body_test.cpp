@@ -16,8 +16,8 @@ namespace {
 using simulate::testing::box_body;
 using simulate::testing::BoxOptions;
 
-constexpr double kCell = 0.01, kLength = 20 * kCell, kArm = 0.03;  // m
-constexpr const char* kScene =
+constexpr double kBarCell = 0.01, kBarLength = 20 * kBarCell, kArm = 0.03;  // m
+constexpr const char* kLedScene =
     "material = \"PLA\"\n"
     "[[fix]]\nwhere = { sphere = { centre = [\"0 cm\", \"3 cm\", \"3 cm\"], radius = \"5 cm\" } }\n"
     "[[move]]\nwhere = { sphere = { centre = [\"20 cm\", \"3 cm\", \"3 cm\"], radius = \"1.5 cm\" } }\n"
@@ -26,14 +26,14 @@ constexpr const char* kScene =
 Body bar() {
   BoxOptions options;
   options.cells = {20, 6, 6};  // more than are factorised at once
-  options.spacing = Vec3::Constant(kCell);
+  options.spacing = Vec3::Constant(kBarCell);
   return box_body(options);
 }
 
 PulledBody pulled(const Body& body) {
   return {body,
-          simulate::parse_scene(kScene, "scene"),
-          {{Vec3(kLength, 3 * kCell, 3 * kCell), false}},
+          simulate::parse_scene(kLedScene, "scene"),
+          {{Vec3(kBarLength, 3 * kBarCell, 3 * kBarCell), false}},
           kArm,
           std::vector<Vec3>(body.element_count(), Vec3::Zero()),
           {ToolPose{}}};
@@ -72,7 +72,7 @@ TEST(Answers, OfALinearPartAreExactForWaysThatItHasSeen) {
   const std::vector<Vec3> rest(part.size(), Vec3::Zero());
   std::vector<Way> seen;
   for (int k = 0; k < 3; ++k) {
-    seen.push_back({{vector(), vector()}});
+    seen.push_back({{kArm * vector(), vector()}});
     answers.learn(seen.back(), rest, answer(seen.back()));
   }
   answers.learn({{}}, rest, std::vector<Vec3>(part.size(), Vec3::Ones()));  // no way: nothing is learnt
@@ -133,7 +133,7 @@ TEST(PulledBody, FollowsNothingThatItCannot) {
   EXPECT_FALSE(part.follow(pose(1), 1e-2)) << "there is no tangent yet";
   ASSERT_TRUE(part.lead(pose(1), 1e-8, 40, kGoOn));
   const std::vector<Vec3> before = part.displacement();
-  const Way through = {{Vec3(-2 * kLength, 0, 0), Vec3::Zero()}};
+  const Way through = {{Vec3(-2 * kBarLength, 0, 0), Vec3::Zero()}};
   EXPECT_FALSE(part.follow(through, 1e-2)) << "it would fold";
   EXPECT_EQ(part.displacement(), before);
   EXPECT_EQ(part.poses(), pose(1));
