@@ -14,6 +14,7 @@ import statistics
 import subprocess
 import time
 
+from browser import chromium
 from harness import BIN, SCENE, Skip, box, expect, expect_error, expect_ok, expect_only, main, need, run, scene, write
 
 TARGETS = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5]
@@ -392,6 +393,15 @@ def test_a_browser_opens_the_page():
     pdf = pathlib.Path("page.pdf").read_bytes()
     boxes = {tuple(round(float(v)) for v in m.split()) for m in re.findall(rb"/MediaBox\s*\[([^\]]*)\]", pdf)}
     expect(boxes and all(abs(b[2] - 595) <= 2 and abs(b[3] - 842) <= 2 for b in boxes), f"A4: {boxes}")
+    for name in viewer_of(parsed()):
+        with chromium() as viewer:
+            viewer.open(pathlib.Path("study", name).resolve().as_uri())
+            names = viewer.run("return flexelView.picture.names")
+            expect("displacement" in names and "stress" in " ".join(names), f"the finest run with what it has: {names}")
+            viewer.choose("colour", "displacement")
+            seen = viewer.picture()
+            expect(seen["share"] > 0.02 and seen["colours"] > 20, f"it is drawn: {seen}")
+            expect(viewer.console() == [], f"in silence: {viewer.console()}")
 
 
 if __name__ == "__main__":
