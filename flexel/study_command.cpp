@@ -45,7 +45,7 @@ struct StudyArguments {
 void declare(CommandLine& app, StudyArguments& a) {
   app.add_option("part", a.job.parts, read_titles() + " files").required().type_name("PART");
   declare_scene(app, a.job);
-  app.add_option("-o,--output", a.output, "Folder for study.csv, study.json and study.html")
+  app.add_option("-o,--output", a.output, "Folder for study.csv, study.json, study.html and finest.html")
       .required()
       .type_name("FOLDER");
   app.add_option("--budget", a.budget, "What all runs together may take (\"5 min\")")

@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
-"""How a part follows a hand in flexel clay, by number of cells: frames a second and milliseconds from the hand to the moved picture, in
-Chromium without a graphics card (SwiftShader), and to the frame alone. The page's weight and load time. Prints the tables of
-docs/guide/clay.md; --pictures FOLDER makes its pictures.
+"""How a part follows a hand in flexel clay, by number of cells: processor time of each stage a frame, frames a second and milliseconds from
+the hand to the drawn picture, in Chromium without a graphics card (SwiftShader), and to the frame alone. The hand goes on by a
+thirtieth of a second with each frame, however long that took, so that a busy machine is given the same work. The page's
+weight and load time. Prints the tables of docs/guide/clay.md; --pictures FOLDER makes its pictures.
 
-    PATH=build/release/bin:$PATH bench/live/clay.py [--seconds S] [--pictures FOLDER]
+    PATH=build/release/bin:$PATH bench/live/clay.py [--frames N] [--pictures FOLDER]
 """
 
 import argparse
 import contextlib
+import json
 import math
 import os
 import pathlib
@@ -26,40 +28,71 @@ from browser import chromium  # noqa: E402
 from clay_browser_test import bent_by_hand, settle  # noqa: E402
 from clay_test import Hand, ask, clay  # noqa: E402
 
-# The tip goes 2 mm up and down, once in two seconds; a pose at every picture.
+# The tip goes 2 mm up and down, once in two seconds; the next pose is said when the one before has been drawn, to its last pixel.
+HZ = 30
 DRAG = """
-const {clay} = flexelView, seconds = arguments[0], start = performance.now();
-clay.latencies = [];
-let shown;
-for (;;) {
-  await new Promise(done => requestAnimationFrame(done));
-  const now = performance.now();
-  if (shown === undefined && now > start + 1000) { shown = clay.shown; clay.latencies = []; }
-  if (now > start + 1000 * (seconds + 1)) return {rate: (clay.shown - shown) / seconds, latencies: clay.latencies};
-  clay.post(`0 0 0 ${2e-3 * Math.sin(Math.PI * (now - start) / 1000)}`);
+const {clay, picture} = flexelView, [poses] = arguments, gl = picture.renderer.getContext(), pixel = new Uint8Array(4), latencies = [];
+const began = performance.now(), drawn = picture.drawn, frame = clay.frame.frame, stages = {};
+const timed = (object, name) => { const own = object[name]; stages[name] = 0;
+  object[name] = function (...given) { const at = performance.now(); try { return own.apply(this, given); } finally { stages[name] += performance.now() - at; } }; };
+timed(clay, "bend");
+timed(picture, "draw");
+for (let k = 0; k < poses; ++k) {
+  const said = performance.now(), before = picture.drawn;
+  clay.post(`0 0 0 ${2e-3 * Math.sin(Math.PI * k / 30)}`);
+  while (clay.busy || clay.waiting.length > 0 || clay.sent.some(each => each.line > clay.frame.line) || picture.drawn === before) {
+    await new Promise(done => requestAnimationFrame(done));
+    if (performance.now() > said + 5000) break;
+  }
+  gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+  latencies.push(performance.now() - said);
 }
+return {seconds: (performance.now() - began) / 1000, drawn: picture.drawn - drawn, frames: clay.frame.frame - frame, latencies, bend: stages.bend};
 """
 
 
-def processor(process):
-    """s, of all of its threads so far."""
-    fields = pathlib.Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()
+def spent(number):
+    """s of processor time, of all threads so far."""
+    fields = pathlib.Path(f"/proc/{number}/stat").read_text().rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def by_program(url, process, seconds):
-    """Frames a second, processor time a frame [s] and latencies [s] of a client that poses as soon as it knows of the pose before."""
+def browser_processes(folder):
+    """{number: kind} of the browser with this profile: "page" runs scripts, "drawing" draws, "rest" is what else it has."""
+    parent, command = {}, {}
+    for entry in pathlib.Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError, IndexError):
+            parent[int(entry.name)] = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
+            command[int(entry.name)] = (entry / "cmdline").read_bytes().decode(errors="replace")
+    found = {number for number, text in command.items() if f"--user-data-dir={folder}" in text}
+    while more := {number for number, above in parent.items() if above in found} - found:
+        found |= more
+    kinds = {"--type=renderer": "page", "--type=gpu-process": "drawing"}
+    return {number: next((kind for text, kind in kinds.items() if text in command[number]), "rest") for number in found}
+
+
+def stages_of(process, folder):
+    """s of processor time so far, by stage."""
+    total = {"run": spent(process.pid), "page": 0, "drawing": 0, "rest": 0}
+    for number, kind in browser_processes(folder).items():
+        with contextlib.suppress(OSError):
+            total[kind] += spent(number)
+    return total
+
+
+def by_program(url, process, frames):
+    """Frames a second, processor time a pose [s] and latencies [s] of a client that poses as soon as it knows of the pose before."""
     hand = Hand(url, 16 * "b")
     hand.act("take", "grab face bracket/2")
-    latencies, first, used, began = [], hand.seen, processor(process), time.monotonic()
-    while (now := time.monotonic()) < began + seconds:
-        status, text = hand.post(f"0 0 0 {2e-3 * math.sin(math.pi * (now - began))}")
-        line = int(text.split(":")[1].strip(" }\n"))
-        while hand.last["line"] < line:
+    latencies, used, began = [], spent(process.pid), time.monotonic()
+    for k in range(frames):
+        now = time.monotonic()
+        status, text = hand.post(f"0 0 0 {2e-3 * math.sin(math.pi * k / HZ)}")
+        line = json.loads(text)["line"]
+        while hand.last["line"] < line and time.monotonic() < now + 10:
             time.sleep(0.0005)
         latencies.append(time.monotonic() - now)
-    frames = max(1, hand.seen - first)
-    rate, work = frames / (time.monotonic() - began), (processor(process) - used) / frames
+    rate, work = frames / (time.monotonic() - began), (spent(process.pid) - used) / frames
     hand.leave()
     return rate, work, latencies
 
@@ -74,22 +107,28 @@ def percentile(values, share):
     return sorted(values)[min(len(values) - 1, int(share * len(values)))]
 
 
-def measure(count, seconds):
+def measure(count, frames):
     with clay("bracket.step", "--count", str(count)) as (url, process):
         setup = Hand(url, 16 * "c")
-        cells = sum(1 for _ in setup.settled()["positions"]) // 3
+        elements = sum(1 for _ in setup.settled()["positions"]) // 3
         setup.act("hold bracket/1", "grab face bracket/2")
         setup.leave()
-        rate, work, latencies = by_program(url, process, seconds)
+        rate, work, latencies = by_program(url, process, frames)
         with chromium() as browser:
             browser.open(url.geturl())
             loaded = browser.run("return performance.getEntriesByName('ready')[0].startTime")
             browser.run("flexelView.clay.post('take')")
-            browser.wait("flexelView.clay.mine && flexelView.clay.frame.tools.length === 1")
-            drawn = browser.run(DRAG, seconds)
-    ms = drawn["latencies"] or [math.nan]
-    print(f"| {count:,} | {cells:,} | {1e3 * work:.0f} | {rate:.1f} | {1e3 * statistics.median(latencies):.0f} | {1e3 * percentile(latencies, 0.95):.0f} | "
-          f"{drawn['rate']:.1f} | {statistics.median(ms):.0f} | {percentile(ms, 0.95):.0f} | {loaded / 1e3:.2f} s |", flush=True)
+            browser.wait("flexelView.clay.mine && flexelView.clay.frame.tools.length === 1 && flexelView.clay.frame.settled")
+            before = stages_of(process, browser.folder)
+            browser.run(f"window.dragged = undefined; (async function () {{{DRAG}}})(arguments[0]).then(found => {{ window.dragged = found; }});", frames)
+            browser.wait("window.dragged", 300)
+            drawn = browser.run("return window.dragged")
+            after = stages_of(process, browser.folder)
+    shown = max(1, drawn["drawn"])
+    stages = {name: 1e3 * (after[name] - before[name]) / shown for name in after}
+    print(f"| {count:,} | {elements:,} | {1e3 * work:.0f} | {rate:.1f} | {1e3 * statistics.median(latencies):.0f} | {stages['run']:.0f} | {stages['page']:.0f}, "
+          f"{drawn['bend'] / shown:.1f} | {stages['drawing']:.0f} | {stages['rest']:.0f} | {2e3 / sum(stages.values()):.1f} | {shown / drawn['seconds']:.1f} | "
+          f"{statistics.median(drawn['latencies']):.0f} | {percentile(drawn['latencies'], 0.95):.0f} | {loaded / 1e3:.2f} s |", flush=True)
 
 
 def pictures(folder):
@@ -122,7 +161,7 @@ def pictures(folder):
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("--seconds", type=float, default=5)
+    parser.add_argument("--frames", type=int, default=90)
     parser.add_argument("--pictures")
     parser.add_argument("--counts", default="1000,5000,20000")
     options = parser.parse_args()
@@ -133,10 +172,10 @@ def main():
         if folder:
             return pictures(folder)
         print(f"The page without data: {page_weight():.2f} MB (bracket.step included); load of the machine before: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores\n")
-        print("| cells asked for | elements | processor ms a frame | frames a second | ms, median | 95 % | drawn a second | ms to the picture, median | 95 % | loaded after |")
-        print("|---|---|---|---|---|---|---|---|---|---|", flush=True)
+        print("| cells asked for | elements | processor ms a pose, program | poses a second | ms, median | run | page, its map | drawing | rest | two cores would show | drawn a second | ms to the picture, median | 95 % | loaded after |")
+        print("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|", flush=True)
         for count in options.counts.split(","):
-            measure(int(count), options.seconds)
+            measure(int(count), options.frames)
         os.chdir("/")
 
 

@@ -41,15 +41,19 @@ void Answers::learn(Way way, const std::vector<Vec3>& before, const std::vector<
   if (!(length > kLeastTaught * arm_ * arm_)) return;
   Known newest{std::move(way), std::vector<Vec3>(after.size())};
   parallel_for_each(after.size(), [&](std::size_t e) { newest.answer[e] = after[e] - before[e]; });
-  std::erase_if(known_, [&](Known& known) {
-    const double was = dot(known.way, known.way, arm_), share = dot(known.way, newest.way, arm_) / length;
-    subtract(known.way, newest.way, share);
-    if (!(dot(known.way, known.way, arm_) > kLeastLeft * was)) return true;
-    add_share(known.answer, newest.answer, -share);
-    return false;
-  });
-  known_.insert(known_.begin(), std::move(newest));
-  if (known_.size() > kMostKnown) known_.pop_back();
+  std::vector<Known> kept;
+  kept.push_back(std::move(newest));
+  for (Known& known : known_) {
+    const double was = dot(known.way, known.way, arm_);
+    for (const Known& newer : kept) {
+      const double share = dot(known.way, newer.way, arm_) / dot(newer.way, newer.way, arm_);
+      subtract(known.way, newer.way, share);
+      add_share(known.answer, newer.answer, -share);
+    }
+    if (kept.size() < kMostKnown && dot(known.way, known.way, arm_) > kLeastLeft * was)
+      kept.push_back(std::move(known));
+  }
+  known_ = std::move(kept);
 }
 
 void Answers::add(Way way, std::vector<Vec3>& displacement) const {

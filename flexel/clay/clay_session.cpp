@@ -41,7 +41,7 @@ constexpr double kBalance = 1e-4;  // of the way of the hand
 constexpr double kTellingForce =
     10;  // times what the residual leaves unknown: what a change of force has to be
 constexpr double kLeastWay = 1e-3;  // of the part, that a hand has to go for kBalance to be measured by it
-constexpr std::chrono::milliseconds kQuiet{100};
+constexpr std::chrono::milliseconds kQuiet{100}, kLongQuiet{500};
 constexpr std::chrono::seconds kLease{10}, kPatience{60};
 constexpr const char* kFormats[] = {"stl", "obj", "3mf", "step", "ply", "off", "glb", "vtu"};
 
@@ -294,7 +294,10 @@ void ClaySession::perform(const Act& act) {
   if (document_.tools.empty()) throw InputError("no tool is there to be led: pull at a place first");
   if (!stroke_.begun) remember();
   stroke_.begun = true;
-  quiet_ = Clock::now() + kQuiet;
+  const Clock::time_point now = Clock::now();
+  const auto gap = now - moved_;  // between poses of a slow machine it does not rest
+  quiet_ = now + (gap < kLongQuiet ? std::clamp<Clock::duration>(3 * gap, kQuiet, kLongQuiet) : kQuiet);
+  moved_ = now;
   if (act.kind == Act::Kind::hand) {
     stroke_.hand = act.pose;
   } else {

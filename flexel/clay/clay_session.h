@@ -90,6 +90,7 @@ class ClaySession {
   std::vector<ClayDocument> undo_, redo_;
   std::unique_ptr<PulledBody> model_;
   Stroke stroke_;
+  Clock::time_point moved_;  // when the last pose was taken up
   Clock::time_point quiet_;  // when the hand will have rested for long enough to find the equilibrium
   std::uint64_t frame_ = 0, grabs_ = 0;
   std::string said_;

@@ -285,6 +285,10 @@ std::string page(const Study& study, const std::map<std::string, std::string>& p
       {"AGAINST", against_part(study)},
       {"PLOT_STAGES", plot(plots, "stages")},
       {"EFFECTS", effects_part(study)},
+      {"VIEWER", study.viewer.empty() ? ""
+                                      : fmt::format("<p><a href=\"{}\">The finest run, to be turned, cut and "
+                                                    "probed</a> (a file beside this one)</p>\n",
+                                                    kViewer)},
       {"PICTURES", pictures_part(study)},
       {"PREDICTIONS", predictions(study)},
       {"LEFT_OUT", left_out(study)},

@@ -39,7 +39,7 @@ constexpr double kKnown = 0.05;       // how well a median should be known
 constexpr int kMostRepeats = 5;
 constexpr double kLongest = 1e9;  // s
 
-constexpr std::array kResults{"study.csv", "study.json", "study.html", kOwnScene};
+constexpr std::array kResults{"study.csv", "study.json", kViewer, "study.html", kOwnScene};
 
 // The results of a study; not a scene that is its input, though an earlier study wrote it.
 std::vector<const char*> results_of(const Assignment& wanted) {
@@ -311,6 +311,7 @@ void Session::run_one(Sweep& sweep, const Trial& trial, Prediction predicted) {
   sweep.done(trial, row.found);
   study_.rows.push_back(row);
   append(row);
+  if (first) keep_finest_body(trial);
   if (row.found.ok())
     progress_.say(fmt::format("{}{}: {} {}, {} (predicted {}), {} (predicted {})", trial.label,
                               first ? "" : fmt::format(", run {}", row.repeat), human_count(row.found.size()),
@@ -331,8 +332,19 @@ RunResult Session::run_trial(const Trial& trial, bool first, const RunOptions& a
   if (first) {
     options.surface = kept("surface", trial, ".ply");
     options.history = kept("history", trial, ".csv");
+    if (trial.sweep == "resolution") options.body = kept("body", trial, ".vtu");
   }
   return run_configuration(wanted_.study_case, trial.configuration, options);
+}
+
+// Of the last run: a body takes more of the disk than a surface.
+void Session::keep_finest_body(const Trial& trial) const {
+  const fs::path body = kept("body", trial, ".vtu");
+  if (!fs::exists(body)) return;
+  if (finest_row() == &study_.rows.back())
+    fs::rename(body, folder_->path() / kFinestBody);
+  else
+    fs::remove(body);
 }
 
 // study.csv grows as runs end, so that whatever happens the rows are there.

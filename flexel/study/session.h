@@ -12,6 +12,7 @@
 namespace flexel::study {
 
 constexpr const char* kOwnScene = "study-scene.toml";
+constexpr const char* kFinestBody = "finest.vtu";  // in the study's temporary folder
 
 struct Assignment {
   Case study_case;
@@ -52,6 +53,8 @@ class Session {
   [[nodiscard]] Deadline in(double seconds) const;  // from now
   void measure_lags(const Row& finest);
   void draw_pictures(const Row& finest);
+  void keep_finest_body(const Trial& trial) const;
+  void draw_viewer();
   void write_all();
   [[nodiscard]] const Row* finest_row() const;
   [[nodiscard]] std::string kept(const char* what, const Trial& trial, const char* ending) const;

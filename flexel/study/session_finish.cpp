@@ -103,6 +103,29 @@ void Session::draw_pictures(const Row& finest) {
   }
 }
 
+// The finest run as flexel view shows it.
+void Session::draw_viewer() {
+  const fs::path body = folder_->path() / kFinestBody, html = folder_->path() / kViewer;
+  if (!fs::exists(body)) return;
+  if (left_to_look() <= 0) {
+    study_.notes.emplace_back("The page of the finest run was left out: the budget was spent.");
+    return;
+  }
+  ChildOptions options;
+  options.log = folder_->path() / "viewer.log";
+  options.deadline = in(left_to_look());
+  const ChildRun run =
+      run_child({own_program("flexel"), "view", body.string(), "--html", html.string(), "--quiet"}, options);
+  if (run.exit_code == 0) {
+    const Bytes bytes = read_all(html.string());
+    study_.viewer.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    return;
+  }
+  const std::string why = error_in_log(options.log);
+  study_.notes.push_back("The page of the finest run was left out: " +
+                         (why.empty() ? "the budget was spent." : why));
+}
+
 void Session::finish() {
   progress_.stage("page");
   if (const Row* finest = finest_row()) {
@@ -110,6 +133,7 @@ void Session::finish() {
     measure_lags(reference);
     // Reading surfaces heeds the interrupt, which has come already.
     try {
+      if (!interrupted_) draw_viewer();
       if (!interrupted_) draw_pictures(*finest);
       if (!interrupted_) measure_surfaces(reference);
     } catch (const Interrupted&) {
@@ -136,13 +160,14 @@ void Session::write_all() {
     progress_.warn(study_.notes.back());
   }
   const auto path = [&](const char* name) { return (wanted_.output / name).string(); };
-  OutputsTogether outputs({path("study.csv"), path("study.json"), path("study.html")});
+  OutputsTogether outputs({path("study.csv"), path("study.json"), path(kViewer), path("study.html")});
   if (columns_) {
     std::string csv = csv_header(*columns_);
     for (std::size_t r = 0; r < study_.rows.size(); ++r) csv += csv_line(r + 1, study_.rows[r], *columns_);
     write_text(csv, path("study.csv"));
   }
   write_text(study_json(study_), path("study.json"));
+  if (!study_.viewer.empty()) write_text(study_.viewer, path(kViewer));
   write_text(page(study_, plots), path("study.html"));
   outputs.appear();
   std::istringstream lines(prediction_table(study_));

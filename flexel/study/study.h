@@ -46,6 +46,8 @@ struct Against {
   std::vector<Agreement> agreements;  // of the quantities that both have
 };
 
+inline constexpr const char* kViewer = "finest.html";  // beside study.html
+
 struct Study {
   std::vector<std::string> parts;  // as they were given
   std::string scene;
@@ -59,6 +61,7 @@ struct Study {
   std::vector<std::string> sentences;
   Against against;
   std::vector<Picture> pictures;
+  std::string viewer;              // HTML of flexel view: the finest run; "": none
   std::vector<std::string> notes;  // for the reader: interrupted, plots left out ...
 };
 

@@ -29,7 +29,7 @@ FLEXEL_TAKE_IN("shape", FLEXEL_PAGE_FOLDER "shape.js");
 FLEXEL_TAKE_IN("elements", FLEXEL_PAGE_FOLDER "elements.js");
 FLEXEL_TAKE_IN("camera", FLEXEL_PAGE_FOLDER "camera.js");
 FLEXEL_TAKE_IN("coarse", FLEXEL_PAGE_FOLDER "coarse.js");
-FLEXEL_TAKE_IN("rough", FLEXEL_PAGE_FOLDER "rough.js");
+FLEXEL_TAKE_IN("smooth", FLEXEL_PAGE_FOLDER "smooth.js");
 FLEXEL_TAKE_IN("panel", FLEXEL_PAGE_FOLDER "panel.js");
 FLEXEL_TAKE_IN("overlay", FLEXEL_PAGE_FOLDER "overlay.js");
 FLEXEL_TAKE_IN("scene", FLEXEL_PAGE_FOLDER "scene.js");
@@ -59,7 +59,7 @@ FLEXEL_TAKEN(shape)
 FLEXEL_TAKEN(elements)
 FLEXEL_TAKEN(camera)
 FLEXEL_TAKEN(coarse)
-FLEXEL_TAKEN(rough)
+FLEXEL_TAKEN(smooth)
 FLEXEL_TAKEN(panel)
 FLEXEL_TAKEN(overlay)
 FLEXEL_TAKEN(scene)
@@ -92,7 +92,7 @@ const PageFiles& page_files() {
     std::string all;
     for (const std::string_view text :
          {unpack_text(), numbers_text(), paint_text(), shape_text(), elements_text(), camera_text(),
-          coarse_text(), rough_text(), panel_text(), overlay_text(), scene_text(), probes_text(),
+          coarse_text(), smooth_text(), panel_text(), overlay_text(), scene_text(), probes_text(),
           record_text(), controls_text(), stream_text(), clay_text(), main_text()})
       append_module(text, all);
     return all;

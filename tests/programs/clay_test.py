@@ -170,6 +170,34 @@ def test_the_scene_does_the_same_without_hands():
         expect(farthest(pathlib.Path(stl).read_bytes(), hands) < 1e-3, f"{stl} is what hands made, within a micrometre")
 
 
+def test_while_the_hand_moves_the_part_follows_and_at_rest_it_is_exact():
+    """Frames tell their residual; many poses lead to where one does."""
+    bracket()
+    with clay("bracket.step", "--count", "3000") as (url, _):
+        hand = Hand(url, 16 * "a")
+        hand.settled()
+        hand.act("hold bracket/1", f"grab at {TIP} 0.003")
+        told = []
+        for step in range(1, 41):
+            status, text = hand.post(f"0 0 {2e-3 * math.sin(0.2 * step)} {-1e-4 * step}")
+            expect(status == 200, text)
+            line, end = json.loads(text)["line"], time.monotonic() + 30
+            while hand.last["line"] < line:
+                expect(time.monotonic() < end and not hand.last["said"], f"it follows: {hand.last['said']}")
+                time.sleep(0.001)
+            told.append((hand.last["residual"], hand.last["settled"]))
+        expect(max(residual for residual, _ in told) <= 1e-2 and min(residual for residual, _ in told) > 1e-8, f"roughly: {told}")
+        expect(sum(settled for _, settled in told) < 5, f"it does not rest on the way: {told}")
+        many = hand.settled(line)
+        expect(many["residual"] <= 1e-8, f"exactly: {many['residual']}")
+        hand.act("undo")
+        once = hand.act(f"0 0 {2e-3 * math.sin(8)} -0.004")
+        apart = max(abs(a - b) for a, b in zip(many["positions"], once["positions"]))
+        expect(apart < 2e-8 and many["place"] == once["place"], f"the same: {apart}")  # single precision of 80 mm
+        expect(max(abs(a - b) for a, b in zip(many["felt"][-1], once["felt"][-1])) < 1e-5 * max(map(abs, once["felt"][-1])), f"{many['felt']} {once['felt']}")
+        hand.leave()
+
+
 def test_undo_and_redo_lead_back_and_forth():
     bracket()
     with clay("bracket.step", "--size", "5 mm") as (url, _):

@@ -14,6 +14,7 @@ import statistics
 import subprocess
 import time
 
+from browser import chromium
 from harness import BIN, SCENE, box, expect, expect_error, expect_ok, expect_only, main, need, run, scene, write
 
 TARGETS = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5]
@@ -141,6 +142,15 @@ def parsed(folder="study"):
     return page
 
 
+def viewer_of(page):
+    """The page of the finest run, which is there unless a note says why not."""
+    if "The page of the finest run was left out" in page.text:
+        return []
+    html = pathlib.Path("study/finest.html").read_text(encoding="utf-8")
+    expect(html.startswith("<!DOCTYPE html>") and 'id="canvas"' in html, "a page of flexel view")
+    return ["finest.html"]
+
+
 def errors_follow_from_values_and_references():
     references = {r["name"]: r for r in json.load(open("study/study.json"))["references"]}
     expect([n for n, r in references.items() if r["decides"]] == ["tip"], f"the probe counts: {references}")
@@ -162,10 +172,11 @@ def errors_follow_from_values_and_references():
 def test_the_page_says_what_the_table_holds():
     """And is one file that a browser opens, made within its budget; a study that cannot begin leaves it as it is."""
     result, budget = study_until(lambda rows: len(sizes(rows)) >= 3, "12 s", "40 s")
-    expect_only("study.csv", "study.html", "study.json", folder="study")
+    expect_only("study.csv", "study.html", "study.json", *viewer_of(parsed()), folder="study")
     expect_the_budget_is_kept(budget)
     expect_one_file()
     expect_a_browser_prints_it()
+    expect_the_finest_run_is_shown()
     errors_follow_from_values_and_references()
     rows, page, summary = rows_of(), parsed(), json.load(open("study/study.json"))
     expect(page.sentences == summary["sentences"], f"{page.sentences} {summary['sentences']}")
@@ -200,7 +211,7 @@ def expect_the_budget_is_kept(seconds):
 
 def expect_one_file():
     page = parsed()
-    expect(page.fetched == [] and page.scripts == 0, f"{page.fetched}")
+    expect(page.fetched == viewer_of(page) and page.scripts == 0, f"{page.fetched}")
     expect(len(page.ids) == len(set(page.ids)), "ids are unique")
     for outside in re.findall(r"url\(([^)]*)\)", page.text):
         expect(outside.strip("\"'").startswith(("#", "data:")), outside)
@@ -212,6 +223,18 @@ def expect_one_file():
     for picture in re.findall(r"data:image/png;base64,([A-Za-z0-9+/=]+)", page.text):
         expect(base64.b64decode(picture, validate=True).startswith(b"\x89PNG\r\n"), "a picture is a PNG")
     expect(len(page.text) < 900_000, f"{len(page.text)} bytes")
+
+
+def expect_the_finest_run_is_shown():
+    for name in viewer_of(parsed()):
+        with chromium() as viewer:
+            viewer.open(pathlib.Path("study", name).resolve().as_uri())
+            names = viewer.run("return flexelView.picture.names")
+            expect("displacement" in names and "stress" in " ".join(names), f"the finest run with what it has: {names}")
+            viewer.choose("colour", "displacement")
+            seen = viewer.picture()
+            expect(seen["share"] > 0.02 and seen["colours"] > 20, f"it is drawn: {seen}")
+            expect(viewer.console() == [], f"in silence: {viewer.console()}")
 
 
 def expect_a_browser_prints_it():

@@ -223,6 +223,7 @@ class Run {
     result_.area = found["area_before"];
     if (!found["volume_after"].is_null())
       result_.quantities.push_back({"volume", "m3", found["volume_after"]});
+    if (!options_.body.empty()) std::filesystem::rename(file("bent.vtu"), options_.body);
   }
 
   const Case& case_;

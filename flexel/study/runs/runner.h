@@ -80,6 +80,7 @@ struct RunResult {
 struct RunOptions {
   std::filesystem::path folder;   // for temporary files; those are gone when the run has ended
   std::filesystem::path surface;  // where the mapped surface is kept (.ply); "": nowhere
+  std::filesystem::path body;     // where the deformed body is kept (.vtu); "": nowhere
   std::filesystem::path history;  // timed runs: file of the energy history (.csv); "": none
   Deadline deadline = kNever;
   // Asked when the lattice is made (of CalculiX the mesh): whether so many cells are to be solved (elements

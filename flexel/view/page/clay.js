@@ -385,8 +385,10 @@ export class Clay {
     this.by("painted").textContent = "Painted: " + painted.map(([part, material]) => `${part} with ${material}`).join(", ");
     const last = frame.tools.length - 1;
     const way = last < 0 ? 0 : Math.hypot(...frame.place[last].slice(0, 3)) / this.unit.factor;
+    const seen = JSON.stringify([frame.holds, frame.place, frame.felt, frame.hand, frame.middles, frame.shapes]);
+    if (seen !== this.seen) this.picture.redraw();
+    this.seen = seen;
     this.by("feel").textContent = last < 0 ? "nothing" : `${this.forceText(last)} at ${numberText(way, 3)}\u00a0${this.unit.name}` + this.turnText(last) + (frame.settled ? "" : " \u2026");
-    this.picture.redraw();
   }
 
   // A gamepad or a phone shakes with the force, as a share of the largest so far.

@@ -2,6 +2,7 @@
 import {clipUniforms, colourOf, cutMaterial, lineMaterial, markMaterials, specialise, surfaceMaterial} from "./paint.js";
 import {coarseTriangles} from "./coarse.js";
 import {DrawnShape} from "./shape.js";
+import {looksOutwards} from "./smooth.js";
 
 const kEdgeInk = {light: "#20262d", dark: "#0c0f12"}, kRestInk = {light: "#7a8794", dark: "#9aa7b4"};
 
@@ -15,8 +16,9 @@ function attribute(array, size) {
 
 // A shape with its lines, at positions of its own.
 class Drawing {
-  constructor(shape, colours, clip, tint) {
+  constructor(shape, colours, clip, tint, slow) {
     this.shape = shape;
+    this.side = slow && looksOutwards(shape) ? THREE.FrontSide : THREE.DoubleSide;
     this.position = attribute(new Float32Array(3 * shape.count), 3);
     this.normal = attribute(new Float32Array(3 * shape.count), 3);
     this.value = attribute(new Float32Array(shape.count), 1);
@@ -80,14 +82,17 @@ class Drawing {
     material.uniforms.lift.value = ghost ? -6e-4 : 0;
     material.transparent = ghost;
     material.depthWrite = !ghost;
-    if (material.side !== (ghost ? THREE.FrontSide : THREE.DoubleSide)) material.needsUpdate = true;
-    material.side = ghost ? THREE.FrontSide : THREE.DoubleSide;
+    const holed = "COLOURED" in material.defines && material.uniforms.outside.value === 2;
+    const side = ghost ? THREE.FrontSide : holed ? THREE.DoubleSide : this.side;
+    if (material.side !== side) material.needsUpdate = true;
+    material.side = side;
   }
 }
 
 export class Panel {
-  // `pack`: what unpack() gave. `colours`: uniforms of all panels; `tints`: of parts.
-  constructor({about, arrays}, colours, tints) {
+  // `pack`: what unpack() gave. `colours`: uniforms of all panels; `tints`: of parts; `slow`: drawing takes the processor.
+  constructor({about, arrays}, colours, tints, slow) {
+    this.slow = slow;
     this.about = about;
     this.facePart = arrays.face_part;
     this.faceNumber = arrays.face_number;
@@ -128,7 +133,7 @@ export class Panel {
   show(kind) {
     this.kind = kind;
     if (!this.after) {
-      const drawing = new Drawing(this.shape, this.colours, this.clip, this.tintOf(this.shape));
+      const drawing = new Drawing(this.shape, this.colours, this.clip, this.tintOf(this.shape), this.slow);
       this.drawings[kind] = drawing;
       this.scene.add(drawing.group);
     }
@@ -153,7 +158,7 @@ export class Panel {
   get before() {
     this.restDrawings = this.restDrawings ?? {};
     if (!this.restDrawings[this.kind]) {
-      const drawing = new Drawing(this.shape, this.colours, this.clip, this.after.surface.geometry.attributes.tint);
+      const drawing = new Drawing(this.shape, this.colours, this.clip, this.after.surface.geometry.attributes.tint, this.slow);
       drawing.place(0, 0);
       drawing.value.array.fill(kNoValue);
       drawing.creases.material.uniforms.lift.value = drawing.borders.material.uniforms.lift.value = 2e-4;  // below the others

@@ -4,8 +4,9 @@ import {logTicks, numberText, roundBelow, roundTicks} from "./numbers.js";
 import {drawAxes, drawLegend, drawScaleBar, themeOf, write} from "./overlay.js";
 import {colourUniforms} from "./paint.js";
 import {Panel} from "./panel.js";
-import {drawsWithProcessor, Rough} from "./rough.js";
+import {drawsWithProcessor, Smooth} from "./smooth.js";
 
+const kMostSmoothed = 200000;  // triangles, of a picture that the processor draws
 const kLegendEms = 9.5, kSlow = 100, kMostSlow = 2, kRest = 700;  // ms, frames, ms
 
 export class Picture {
@@ -14,12 +15,13 @@ export class Picture {
     this.page = page;
     this.canvas = canvas;
     this.overlay = overlay;
-    this.renderer = new THREE.WebGLRenderer({canvas, antialias: true, alpha: true});
+    const slow = drawsWithProcessor(document.createElement("canvas"));
+    this.renderer = new THREE.WebGLRenderer({canvas, antialias: !slow, alpha: true});
     this.renderer.autoClear = false;
-    if (drawsWithProcessor(this.renderer.getContext())) this.sketch = new Rough(this.renderer);
+    if (slow) this.smooth = new Smooth(this.renderer);
     this.renderer.setScissorTest(true);
     this.colours = colourUniforms(page.colours);
-    this.panels = packs.map(pack => new Panel(pack, this.colours, page.colours.tints));
+    this.panels = packs.map(pack => new Panel(pack, this.colours, page.colours.tints, slow));
     this.view = new View(page.up);
     this.view.changed = () => this.move();
     this.frames = Math.max(...this.panels.map(panel => panel.frames));
@@ -166,7 +168,7 @@ export class Picture {
   // Redraws what is in motion: roughly where frames were slow, and fully once it rests.
   move() {
     this.coarse = this.slow >= kMostSlow;
-    this.rough = this.sketch !== undefined;
+    this.rough = this.smooth !== undefined;
     clearTimeout(this.resting);
     this.redraw();
   }
@@ -208,32 +210,34 @@ export class Picture {
     if (!this.width) return;
     const {renderer} = this, layout = this.layout;
     this.colours.hatch.value = 7 * this.pixelRatio;
-    renderer.setScissor(0, 0, this.width, this.height);
-    renderer.setViewport(0, 0, this.width, this.height);
-    renderer.setClearColor(0, 0);
-    renderer.clear();
-    if (this.rough) this.sketch.begin(this.canvas.width, this.canvas.height);
-    this.panels.forEach((panel, k) => this.drawPanel(panel, layout[k]));
-    if (this.rough) {
+    const whole = () => {
       renderer.setScissor(0, 0, this.width, this.height);
       renderer.setViewport(0, 0, this.width, this.height);
-      this.sketch.end();
-    }
+    };
+    const drawAll = (...how) => this.panels.forEach((panel, k) => this.drawPanel(panel, layout[k], ...how));
+    const smoothed = this.smooth && !this.rough && this.panels.every(({shape}) => shape.triangles.length < 3 * kMostSmoothed);
+    renderer.setClearColor(0, 0);
+    if (smoothed) this.smooth.draw(this.canvas.width, this.canvas.height, drawAll);
+    whole();
+    renderer.clear();
+    smoothed ? this.smooth.show() : drawAll();
     this.drawOver(layout);
     ++this.drawn;
     this.onDraw?.();
   }
 
-  drawPanel(panel, {x, y, width, height}) {
+  // `room`, `shift`: as Smooth.draw() has them.
+  drawPanel(panel, {x, y, width, height}, room, shift) {
     const {renderer, state} = this, bottom = this.height - y - height;
     this.view.apply(panel.camera, this.radiusOf(panel), width / height);
+    if (shift) [width, height].forEach((size, k) => { panel.camera.projectionMatrix.elements[12 + k] += 2 * shift[k] / (size * this.pixelRatio); });
     const pixels = box => box.map(value => value * this.pixelRatio);
     renderer.setViewport(x, bottom, width, height);
     const part = (from, to, side) => {
       const box = [x + from * width, bottom, (to - from) * width, height];
       panel.choose(state.before, state.edges, side, this.coarse, this.hasLegend);
       renderer.setScissor(...box);
-      if (this.rough) this.sketch.room(pixels([x, bottom, width, height]), pixels(box));
+      room?.(pixels([x, bottom, width, height]), pixels(box));
       renderer.render(panel.scene, panel.camera);
     };
     if (state.before !== "wipe" || !panel.shape.moved) return part(0, 1, "both");
