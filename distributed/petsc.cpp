@@ -26,7 +26,9 @@ std::set<std::string> given_options;
 
 PetscErrorCode keep_error(MPI_Comm, int, const char* function, const char*, PetscErrorCode code,
                           PetscErrorType kind, const char* message, void*) {
-  out_of_memory = out_of_memory || code == PETSC_ERR_MEM;
+  // Its code for want of memory is not always the one that comes.
+  out_of_memory = out_of_memory || code == PETSC_ERR_MEM ||
+                  (function && std::string_view(function).starts_with("PetscMalloc"));
   if (kind == PETSC_ERROR_INITIAL)
     first_error = std::string(function ? function : "PETSc") + ": " + (message ? message : "");
   return code;
