@@ -58,7 +58,7 @@ std::string to_json(const ListInfo& info) {
     const Vec3& spacing = part.lattice.spacing;
     parts.push_back({{"name", part.name}, {"spacing", {spacing.x(), spacing.y(), spacing.z()}}});
   }
-  const Json json = {
+  const nlohmann::ordered_json json = {
       {"run", info.run}, {"largest_displacement", info.displacement}, {"parts", parts}, {"pieces", pieces}};
   return json_text(json, 2) + "\n";
 }

@@ -1,4 +1,4 @@
-// A piece's file is a body file with five arrays more: field data "pieces_run", "pieces_index" and "pieces_points",
+// A piece's file is a body file with six arrays more: field data "pieces_run", "pieces_index" and "pieces_points",
 // point data "GlobalPointIds", and "vtkGhostType" of points and cells.
 #include "formats/pieces/pieces.h"
 

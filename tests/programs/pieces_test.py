@@ -134,14 +134,13 @@ def test_info_says_what_a_list_holds():
 def test_what_does_not_read_a_list_says_what_to_do():
     pieces(2, "box.stl", "--size", "2 mm")
     write("scene.toml", 'material = "steel"\n[[fix]]\nwhere = "xmin"\n')
-    for program in (["flexel", "picture", "body.pvtu", "-o", "x.png"], ["flexel", "view", "body.pvtu", "-o", "x.html"],
+    for program in (["flexel", "picture", "body.pvtu", "-o", "x.png"], ["flexel", "view", "body.pvtu", "--html", "x.html"],
                     ["flexel-voxelize", "body.pvtu", "-o", "x.vtu"], ["flexel-simulate", "scene.toml", "body.pvtu", "-o", "x.vtu"]):
         expect_error(run(*program), program[0], "body.pvtu", "pieces", ".vtu")
     expect_ok(run("flexel", "picture", "body_1.vtu", "-o", "x.png"))
     expect_ok(run("flexel-map", "body_1.vtu", "-o", "x.stl"))
-    expect_ok(run("flexel-simulate", "scene.toml", "body_0.vtu", "-o", "x.vtu"))
     expect_error(run("flexel-map", "body_surface.vtu", "-o", "x.stl"), "flexel-map", "body_surface.vtu", ".pvtu")
-    for option in (["--onto", "box.stl"], ["--save-binding", "x.bin", "--keep-vertices"], ["--crack", "open"]):
+    for option in (["--onto", "box.stl"], ["--save-binding", "x.bin", "--keep-vertices", "--method", "affine"], ["--crack", "open"]):
         expect_error(run("flexel-map", "body.pvtu", "-o", "x.stl", *option), "flexel-map", option[0], "without --pieces")
 
 

@@ -31,7 +31,7 @@ struct VoxelizeOptions {
   Placement placement = Placement::corner;
   Align align = Align::snap;
   std::size_t pieces = 0;  // that the lattice is cut into, one after another; 0: it is made as a whole
-  bool moments = false;  // also the exact moments of cut cells (Body::moments); corner placement
+  bool moments = false;    // also the exact moments of cut cells (Body::moments); corner placement
   HealChoice heal;
   std::string material;              // of every part; "" leaves it to the scene
   std::optional<double> max_memory;  // bytes; default memory_to_use()

@@ -64,7 +64,7 @@ struct VoxelizeResult {
   Body body;
   std::vector<VoxelizedPart> parts;
   std::vector<PartPair> pairs;
-  double size = 0;               // m, asked for, or chosen for the count
+  double size = 0;  // m, asked for, or chosen for the count
   bool with_moments = false;
   double simulation_memory = 0;  // bytes that simulate will need at equilibrium, estimated
 };
