@@ -20,11 +20,15 @@ namespace {
 
 constexpr std::size_t kMessage = std::size_t{1} << 30;  // bytes
 constexpr int kTag = 1;
-std::string first_error;  // that PETSc told since the last ok()
+std::string first_error;     // that PETSc told since the last ok()
+bool out_of_memory = false;  // likewise
 std::set<std::string> given_options;
 
 PetscErrorCode keep_error(MPI_Comm, int, const char* function, const char*, PetscErrorCode code,
                           PetscErrorType kind, const char* message, void*) {
+  // Its code for want of memory is not always the one that comes.
+  out_of_memory = out_of_memory || code == PETSC_ERR_MEM ||
+                  (function && std::string_view(function).starts_with("PetscMalloc"));
   if (kind == PETSC_ERROR_INITIAL)
     first_error = std::string(function ? function : "PETSc") + ": " + (message ? message : "");
   return code;
@@ -52,7 +56,7 @@ void in_messages(Bytes& bytes, const Each& each) {
 void ok(PetscErrorCode code) {
   if (code == 0) return;
   const std::string said = std::exchange(first_error, "");
-  if (code == PETSC_ERR_MEM) throw std::bad_alloc();
+  if (std::exchange(out_of_memory, false)) throw std::bad_alloc();
   throw std::runtime_error(said.empty() ? "PETSc or MPI failed with code " + std::to_string(code) : said);
 }
 

@@ -131,8 +131,8 @@ def scaling_table(folder, title, words, cases):
 
 def message_table(results):
     print("\n## What ranks exchange\n\nBy PETSc's `-log_view`, between all ranks together. A product sends the displacements of the elements of a slab's end faces: "
-          "24 bytes for each of theirs, each way, so (cells across)² x 24 bytes a face and direction, whatever the slab's length. `computed` is that.\n")
-    head("cells", "ranks", "cells a rank", "products", "bytes a product, all levels of GAMG", "computed, finest level alone", "messages a product", "reductions a CG iteration")
+          "24 bytes for each of theirs, each way, so (cells across)² x 24 bytes a face and direction, whatever the slab's length. `computed` is that; measured is the mean over the products of all levels of GAMG, of which the coarser ones send less.\n")
+    head("cells", "ranks", "cells a rank", "products", "bytes a product, mean of all levels", "computed, finest level alone", "messages a product", "reductions a CG iteration")
     for sides, found in results:
         ranks, ev = found["ranks"], found["events"]
         if ranks == 1 or "MatMult" not in ev:
@@ -162,7 +162,7 @@ def billion(results):
     each = cells / ranks
     side = (cells / 4) ** (1 / 3)
     iterations = max(found["cg_iterations"] for _, found in results)
-    best = min((found["linear"] / found["cg_iterations"] / (found["cells"] / found["ranks"]), found) for _, found in results if found["ranks"] == 1)
+    least = min(found["processor"] / found["cg_iterations"] / found["cells"] for _, found in results if found["ranks"] == 1)
     face = 24 * side * side
     print(f"""
 ## A billion cells on 1,000 ranks, from these
@@ -174,10 +174,10 @@ def billion(results):
 | memory of rank 0 besides | {whole * cells / 1e9:,.0f} GB | {whole:,.0f} bytes a cell of the whole body, rank 0 above less its piece |
 | bytes a product and rank, finest level | {2 * face / 1e6:.1f} MB | two faces of {side:,.0f} x {side:,.0f} elements, 24 bytes each |
 | bytes a tangent and rank | {2 * 27 * 72 * side * side / 1e9:.2f} GB | 27 blocks of 72 bytes an element of those faces |
-| solver's seconds a rank | {best[0] * each * iterations:,.0f} s | {best[0] * 1e6:.2f} us a cell and CG iteration on one rank above, {iterations} iterations, were they as many |
+| processor seconds a rank | {least * each * iterations:,.0f} s | {least * 1e6:.1f} us a cell and CG iteration, all of the run on one rank above, and {iterations} iterations, the most above |
 
 So rank 0 is what stops it: it holds the whole body, and a machine of 1 TB ends near {1e12 / max(whole, 1) / 1e9:.1f} billion cells of slabs. Slabs of a bar 4:1:1 cut in 1,000 are {4 * side / 1000:.1f} cells
-thick, with as many elements on their faces as within; and PETSc as Debian builds it counts unknowns in 32 bits, which end at 2.1e9 (3e9 are needed):
+thick, with as many elements on their faces as within: so many ranks want another cut. And PETSc as Debian builds it counts unknowns in 32 bits, which end at 2.1e9 (3e9 are needed):
 `libpetsc64-real-dev` has 64.""")
 
 
@@ -202,7 +202,7 @@ def yardstick(folder, source, results):
         if found["ranks"] <= 2:
             row("flexel-simulate-mpi", found["ranks"], f"{found['unknowns']:,}", found["cg_iterations"], f"{found['ksp']:.1f}",
                 f"{1e6 * found['ksp'] / found['unknowns'] / found['cg_iterations']:.2f}")
-    print("\nSeconds of the event KSPSolve, by the wall's clock: on a machine with other work the ratio is what counts.")
+    print("\nSeconds of the event KSPSolve, by the wall's clock, on a machine with the load above; it holds GAMG's setup too.")
 
 
 def event_seconds(log, name):
