@@ -8,6 +8,11 @@
 namespace flexel::simulate {
 namespace {
 
+constexpr std::size_t kChunk = 256;
+
+static_assert(sizeof(PairRubbing) == sizeof(double) * contact_kernels::kRubbingRow &&
+              sizeof(PairRecord) == sizeof(double) * contact_kernels::kRecordRow);
+
 Vec3 at_most(const Vec3& value, double most) {
   const double norm = value.norm();
   return norm > most ? Vec3(value * (most / norm)) : value;
@@ -31,42 +36,40 @@ std::array<Vec3, 2> ContactFriction::meeting_place(const ContactPair& pair) cons
 }
 
 // finish_step() asks for the motions that loads() of the next step asks for again.
-void ContactFriction::find_motions(const State& state) {
+bool ContactFriction::find_motions(const State& state) {
   if (evaluation_ == states_.evaluations() && velocities_.size() == list_.elements().size() &&
       same_bits(list_.runs(), state.velocity, velocities_))
-    return;
+    return false;
   evaluation_ = states_.evaluations();
   velocities_.resize(list_.elements().size());
   gather(list_.runs(), state.velocity, velocities_);
-  const CarryingCells& cells = states_.cells();
-  point_velocity_.resize(cells.points().size());
-  cell_gradient_.resize(cells.cells().size());
-  point_found_.resize(cells.points().size(), 0);
-  cell_found_.resize(cells.cells().size(), 0);
+  motions_.resize(list_.points().size());
+  point_found_.resize(motions_.size(), 0);
+  wanted_.clear();
   ++found_;
   const auto find = [&](std::uint32_t point) {
-    if (std::exchange(point_found_[point], found_) == found_) return;
-    point_velocity_[point] = cells.at_point(point, velocities_);
-    const std::uint32_t cell = cells.points()[point].cell;
-    if (std::exchange(cell_found_[cell], found_) == found_) return;
-    if (cells.cells()[cell].deforms())
-      cell_gradient_[cell] = cells.gradient(cell, velocities_) * states_.points()[point].inverse;
-    else
-      cell_gradient_[cell].setZero();
+    if (std::exchange(point_found_[point], found_) != found_) wanted_.push_back(point);
   };
   for (const std::uint32_t p : states_.active()) {
-    const ContactPair& pair = list_.pairs()[p];
-    if (!(states_[p].pressure > 0) && !(pair.properties.pull_off > 0)) continue;
-    find(pair.i);
-    if (!pair.of_plane()) find(pair.j);
+    if (!(states_[p].pressure > 0) && !(list_.pairs()[p].properties.pull_off > 0)) continue;
+    const contact_kernels::PairSides& of = states_.sides()[p];
+    find(of.i);
+    if (!of.of_plane) find(of.j);
   }
+  static_assert(sizeof(PointMotion) == sizeof(double) * contact_kernels::kMotionRow);
+  parallel_chunks(wanted_.size(), 256, [&](std::size_t begin, std::size_t end) {
+    contact_kernel_table().move(
+        states_.cells().points().data(), wanted_.data() + begin, end - begin, state.velocity.data()->data(),
+        reinterpret_cast<const double*>(states_.points().data()), reinterpret_cast<double*>(motions_.data()));
+  });
+  return true;
 }
 
 // m/s, of j against i where they meet.
 Vec3 ContactFriction::relative_velocity(const ContactPair& pair) const {
   const std::array<Vec3, 2> place = meeting_place(pair);
   const auto at = [&](std::uint32_t point, const Vec3& away) {
-    return Vec3(point_velocity_[point] + cell_gradient_[states_.cells().points()[point].cell] * away);
+    return Vec3(motions_[point].velocity + motions_[point].gradient * away);
   };
   const Vec3 of_i = at(pair.i, place[0]);
   return pair.of_plane() ? Vec3(-of_i) : Vec3(at(pair.j, place[1]) - of_i);
@@ -115,23 +118,59 @@ const PointLoads& ContactFriction::loads(const State& state) {
   const std::vector<std::uint32_t>& active = states_.active();
   loads_.reset(list_.points().size());
   if (active.empty()) return loads_;
-  if (damping_ > 0) find_motions(state);
-  forces_.resize(active.size());
-  parallel_for_each(
-      active.size(), [&](std::size_t c) { forces_[c] = force(active[c]); }, 512);
+  const bool other = damping_ > 0 && find_motions(state);
+  if (other || rubbed_ != states_.evaluations()) rub(-1, false);
   for (std::size_t c = 0; c < active.size(); ++c) {
-    if (forces_[c] == Vec3::Zero()) continue;
-    const ContactPair& pair = list_.pairs()[active[c]];
-    const std::array<Vec3, 2> place = meeting_place(pair);
-    PointLoad& on_i = loads_.of(pair.i);
-    on_i.force -= forces_[c];
-    if (pair.of_plane()) continue;
-    on_i.couple -= forces_[c] * place[0].transpose();
-    PointLoad& on_j = loads_.of(pair.j);
-    on_j.force += forces_[c];
-    on_j.couple += forces_[c] * place[1].transpose();
+    const auto& [force, way, share] = rubbing_[c];
+    if (force == Vec3::Zero()) continue;
+    const contact_kernels::PairSides& of = states_.sides()[active[c]];
+    PointLoad& on_i = loads_.of(of.i);
+    on_i.force -= force;
+    if (of.of_plane) continue;
+    on_i.couple -= force * (share * way).transpose();
+    PointLoad& on_j = loads_.of(of.j);
+    on_j.force += force;
+    on_j.couple += force * ((share - 1) * way).transpose();
   }
   return loads_;
+}
+
+// Of what sticks one by one.
+void ContactFriction::rub_chunk(std::size_t begin, std::size_t end, double drift, bool fresh) {
+  std::array<std::uint32_t, kChunk> pairs, places;
+  std::array<double, kChunk> friction;
+  std::array<PairRubbing, kChunk> found;
+  std::size_t count = 0;
+  for (std::size_t c = begin; c < end; ++c) {
+    const std::uint32_t p = states_.active()[c];
+    const ContactPair& pair = list_.pairs()[p];
+    if (!(pair.properties.pull_off > 0) && !memory_[p].sticks()) {
+      places[count] = static_cast<std::uint32_t>(c);
+      friction[count] = pair.properties.friction;
+      pairs[count++] = p;
+      continue;
+    }
+    if (drift >= 0) update_record(p, drift, fresh);
+    const std::array<Vec3, 2> place = meeting_place(pair);
+    rubbing_[c] = {force(p), place[0] - place[1], 0};
+    if (rubbing_[c].way != Vec3::Zero())
+      rubbing_[c].share = place[0] == Vec3::Zero() ? 0 : place[1] == Vec3::Zero() ? 1 : 0.5;
+  }
+  if (count == 0) return;
+  contact_kernel_table().rub(
+      states_.view(pairs.data(), count),
+      {damping_, drift, reinterpret_cast<const double*>(states_.states().data()),
+       reinterpret_cast<const double*>(motions_.data()), reinterpret_cast<double*>(memory_.data())},
+      friction.data(), reinterpret_cast<double*>(found.data()));
+  for (std::size_t n = 0; n < count; ++n) rubbing_[places[n]] = found[n];
+}
+
+void ContactFriction::rub(double drift, bool fresh) {
+  rubbed_ = states_.evaluations();
+  rubbing_.resize(states_.active().size());
+  motions_.resize(list_.points().size());
+  parallel_chunks(rubbing_.size(), kChunk,
+                  [&](std::size_t begin, std::size_t end) { rub_chunk(begin, end, drift, fresh); });
 }
 
 void ContactFriction::finish_step(const State& state, double drift, bool active) {
@@ -139,8 +178,7 @@ void ContactFriction::finish_step(const State& state, double drift, bool active)
   if (list_.pairs().empty() || !active) return;
   forget_separated();
   find_motions(state);
-  parallel_for_each(
-      states_.active().size(), [&](std::size_t c) { update_record(states_.active()[c], drift, fresh); }, 512);
+  rub(drift, fresh);
   last_active_ = states_.active();
   last_builds_ = list_.builds();
 }

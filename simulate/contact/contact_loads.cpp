@@ -19,32 +19,42 @@ void ContactLoads::clear() {
   for (RigidLoad& load : rigid_loads_) load.force = load.torque = Vec3::Zero();
 }
 
+std::array<Vec3, 8> ContactLoads::on_elements(const ContactPoint& point, const PointState& now,
+                                              const PointLoad& load, const PairStates& states) const {
+  const InterpolationWeights& at = point.at;
+  std::array<Vec3, 8> on;
+  for (std::uint32_t a = 0; a < at.count; ++a) on[a] = at.weights[a] * load.force;
+  if (at.count != 8) return on;
+  const Vec3& normal = now.side.normal;
+  const Vec3 turned = now.inverse * (load.turning - load.turning.dot(normal) * normal);
+  const Mat3 couple = normal * turned.transpose() + load.couple * now.inverse.transpose();
+  const std::array<Vec3, 3>& slopes = states.cells().slopes(point.part);
+  const Vec3 x = couple * slopes[0], y = couple * slopes[1], z = couple * slopes[2];
+  const Vec3 sum = x + y, difference = x - y;
+  on[0] -= sum + z, on[1] += difference - z, on[2] -= difference + z, on[3] += sum - z;
+  on[4] += z - sum, on[5] += difference + z, on[6] += z - difference, on[7] += sum + z;
+  return on;
+}
+
 void ContactLoads::add(const State& state, const PairList& list, const PairStates& states,
                        const PointLoads& loads, std::vector<Vec3>& forces) {
+  static_assert(sizeof(PointLoad) == sizeof(double) * contact_kernels::kLoadRow);
+  if (loads.points().empty()) return;
+  contact_kernel_table().spread(states.cells().points().data(),
+                                reinterpret_cast<const double*>(states.points().data()),
+                                loads.points().data(), loads.points().size(),
+                                reinterpret_cast<const double*>(loads.loads().data()), forces.data()->data());
+  if (rigid_loads_.empty()) return;
   for (std::size_t n = 0; n < loads.points().size(); ++n) {
-    const PointLoad& load = loads.loads()[n];
     const ContactPoint& point = list.point(loads.points()[n]);
-    const PointState& now = states.points()[loads.points()[n]];
-    const InterpolationWeights& at = point.at;
-    std::array<Vec3, 8> on;
-    for (std::uint32_t a = 0; a < at.count; ++a) on[a] = at.weights[a] * load.force;
-    if (at.count == 8) {
-      const Vec3& normal = now.side.normal;
-      const Vec3 turned = now.inverse * (load.turning - load.turning.dot(normal) * normal);
-      const Mat3 couple = normal * turned.transpose() + load.couple * now.inverse.transpose();
-      const std::array<Vec3, 3>& slopes = states.cells().slopes(point.part);
-      const Vec3 x = couple * slopes[0], y = couple * slopes[1], z = couple * slopes[2];
-      const Vec3 sum = x + y, difference = x - y;
-      on[0] -= sum + z, on[1] += difference - z, on[2] -= difference + z, on[3] += sum - z;
-      on[4] += z - sum, on[5] += difference + z, on[6] += z - difference, on[7] += sum + z;
-    }
-    for (std::uint32_t a = 0; a < at.count; ++a) forces[at.elements[a]] += on[a];
     if (rigid_load_[point.part] == kNotRigid) continue;
+    const std::array<Vec3, 8> on =
+        on_elements(point, states.points()[loads.points()[n]], loads.loads()[n], states);
     RigidLoad& rigid = rigid_loads_[rigid_load_[point.part]];
-    for (std::uint32_t a = 0; a < at.count; ++a) {
+    for (std::uint32_t a = 0; a < point.at.count; ++a) {
+      const std::uint32_t e = point.at.elements[a];
       rigid.force += on[a];
-      rigid.torque +=
-          (surface_.body().rest[at.elements[a]] + state.displacement[at.elements[a]]).cross(on[a]);
+      rigid.torque += (surface_.body().rest[e] + state.displacement[e]).cross(on[a]);
     }
   }
 }

@@ -4,8 +4,8 @@
 
 namespace flexel::simulate {
 
-// Sums over the pairs of a contact point.
-struct PointLoad {
+// Sums over the pairs of a contact point: a row of simulate/kernels/kernel_contact.h.
+struct alignas(64) PointLoad {
   Vec3 force = Vec3::Zero();    // N
   Vec3 turning = Vec3::Zero();  // J, dU/dn
   Mat3 couple = Mat3::Zero();   // N m, sum of force (x) its place from the point
@@ -60,6 +60,9 @@ class ContactLoads {
   [[nodiscard]] std::vector<RigidLoad> about_centres(const State& state) const;
 
  private:
+  [[nodiscard]] std::array<Vec3, 8> on_elements(const ContactPoint& point, const PointState& now,
+                                                const PointLoad& load, const PairStates& states) const;
+
   static constexpr std::size_t kNotRigid = SIZE_MAX;
   const ContactSurface& surface_;
   std::vector<RigidLoad> rigid_loads_;   // of free rigid parts that can touch

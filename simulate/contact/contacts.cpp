@@ -67,13 +67,13 @@ void Contacts::add_forces(const State& state, std::vector<Vec3>& forces) {
   point_loads_.reset(list_.points().size());
   for (const std::uint32_t p : states_.active()) {
     const PairState& now = states_[p];
-    const ContactPair& pair = list_.pairs()[p];
     if (!(now.pressure > 0)) continue;
-    PointLoad& on_i = point_loads_.of(pair.i);
+    const contact_kernels::PairSides& of = states_.sides()[p];
+    PointLoad& on_i = point_loads_.of(of.i);
     on_i.force -= now.force;
     on_i.turning += now.turning[0];
-    if (pair.of_plane()) continue;
-    PointLoad& on_j = point_loads_.of(pair.j);
+    if (of.of_plane) continue;
+    PointLoad& on_j = point_loads_.of(of.j);
     on_j.force += now.force;
     on_j.turning += now.turning[1];
   }

@@ -6,7 +6,7 @@
 
 namespace flexel::simulate {
 
-CarryingCells::CarryingCells(const ContactSurface& surface) {
+CarryingCells::CarryingCells(const ContactSurface& surface) : surface_(surface) {
   for (std::uint32_t p = 0; p < surface.body().parts.size(); ++p) {
     const std::array<Vec3, 8>& of = surface.gradients(p);
     slopes_.push_back({0.5 * (of[1] - of[0]), 0.5 * (of[2] - of[0]), 0.5 * (of[4] - of[0])});
@@ -37,16 +37,30 @@ void CarryingCells::reset(const PairList& list) {
             list.elements().begin());
       cells_.push_back(cell);
     }
-    points_[order[n]] = {static_cast<std::uint32_t>(cells_.size() - 1), point.at.weights};
+    points_[order[n]] = carried(point, surface_.broken(points[order[n]]));
+    points_[order[n]].cell = static_cast<std::uint32_t>(cells_.size() - 1);
   }
 }
 
-Vec3 CarryingCells::at_point(std::uint32_t point, const std::vector<Vec3>& values) const {
-  const CarriedPoint& of = points_[point];
-  const CarryingCell& cell = cells_[of.cell];
-  Vec3 sum = Vec3::Zero();
-  for (std::uint32_t a = 0; a < cell.count; ++a) sum += of.weights[a] * values[cell.corners[a]];
-  return sum;
+CarriedPoint CarryingCells::carried(const ContactPoint& point, bool broken) const {
+  CarriedPoint made{};
+  for (std::size_t a = 0; a < 8; ++a) {
+    const bool used = a < point.at.count;
+    made.weights[a] = used ? point.at.weights[a] : 0;
+    made.elements[a] = point.at.elements[used ? a : 0];
+  }
+  made.count = point.at.count;
+  for (int axis = 0; axis < 3; ++axis) {
+    made.rest[axis] = point.rest[axis];
+    made.normal[axis] = point.normal[axis];
+    for (int c = 0; c < 3 && point.at.count == 8; ++c)
+      made.slopes[3 * axis + c] = slopes_[point.part][static_cast<std::size_t>(axis)][c];
+  }
+  made.own_plane = point.shape == ContactShape::face ? 1 : 0;
+  made.radius = point.radius;
+  made.ball = point.shape == ContactShape::ball ? 1 : 0;
+  made.broken = broken ? 1 : 0;
+  return made;
 }
 
 std::array<Vec3, 3> CarryingCells::differences(const CarryingCell& cell, const std::vector<Vec3>& values) {
@@ -55,13 +69,6 @@ std::array<Vec3, 3> CarryingCells::differences(const CarryingCell& cell, const s
   const Vec3 sum01 = at(0) + at(1), sum23 = at(2) + at(3), sum45 = at(4) + at(5), sum67 = at(6) + at(7);
   return {(up01 + up23) + (up45 + up67), (sum23 - sum01) + (sum67 - sum45),
           (sum45 + sum67) - (sum01 + sum23)};
-}
-
-Mat3 CarryingCells::gradient(std::uint32_t cell, const std::vector<Vec3>& values) const {
-  const std::array<Vec3, 3> along = differences(cells_[cell], values);
-  const std::array<Vec3, 3>& slopes = slopes_[cells_[cell].part];
-  return along[0] * slopes[0].transpose() + along[1] * slopes[1].transpose() +
-         along[2] * slopes[2].transpose();
 }
 
 // The axes are square to one another.

@@ -3,6 +3,7 @@
 // is found once.
 #pragma once
 #include "simulate/contact/pairs/pair_list.h"
+#include "simulate/kernels/kernel_contact.h"
 
 namespace flexel::simulate {
 
@@ -13,14 +14,11 @@ struct CarryingCell {
   [[nodiscard]] bool deforms() const { return count == 8; }  // else its points have no normal
 };
 
-struct CarriedPoint {
-  std::uint32_t cell = 0;
-  std::array<double, 8> weights{};
-};
+using contact_kernels::CarriedPoint;
 
 class CarryingCells {
  public:
-  explicit CarryingCells(const ContactSurface& surface);
+  explicit CarryingCells(const ContactSurface& surface);  // outlives this
 
   // To the points of a new list; those that nothing of eight corners carries get a cell each.
   void reset(const PairList& list);
@@ -31,11 +29,8 @@ class CarryingCells {
   // signs of a.
   [[nodiscard]] const std::array<Vec3, 3>& slopes(std::uint32_t part) const { return slopes_[part]; }
 
-  // `values`: (PairList::elements()).
-  [[nodiscard]] Vec3 at_point(std::uint32_t point, const std::vector<Vec3>& values) const;
-  // Of a cell that deforms, by the places at rest: the mean over it.
-  [[nodiscard]] Mat3 gradient(std::uint32_t cell, const std::vector<Vec3>& values) const;
-  // Its norm.
+  // Norm of the gradient of `values` (PairList::elements()) in a cell that deforms, by the places at rest: the mean
+  // over it.
   [[nodiscard]] double gradient_norm(const CarryingCell& cell, const std::vector<Vec3>& values) const;
 
  private:
@@ -43,6 +38,9 @@ class CarryingCells {
   [[nodiscard]] static std::array<Vec3, 3> differences(const CarryingCell& cell,
                                                        const std::vector<Vec3>& values);
 
+  [[nodiscard]] CarriedPoint carried(const ContactPoint& point, bool broken) const;
+
+  const ContactSurface& surface_;
   std::vector<CarryingCell> cells_;
   std::vector<CarriedPoint> points_;
   std::vector<std::array<Vec3, 3>> slopes_;  // (parts)

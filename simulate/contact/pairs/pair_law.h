@@ -59,6 +59,7 @@ struct NormalLaw {
   }
 };
 
+// A row of simulate/kernels/kernel_contact.h, as the next one.
 struct PairConstants {
   double stiffness = 0;  // kappa A_i A_j [N m], or kappa A [N/m] where the kernel is 1
   double width = 0;      // rho [m]; 0: the kernel is 1
@@ -67,22 +68,22 @@ struct PairConstants {
   NormalLaw law;
 };
 
-struct PairState {
-  bool near = false;     // within the kernel and facing; else the rest is not set
-  bool deep = false;     // near, but deeper than the limit: of the rest only the gap holds
-  double gap = 0;        // m
-  double weight = 0;     // kappa A_i A_j K w [N/m]
-  double energy = 0;     // J
-  double pressure = 0;   // N, magnitude of the force along the normal
-  double stiffness = 0;  // N/m
-  double share = 0;      // of the soft part: its slope in that of the linear range
-  Vec3 normal = Vec3::Zero();
-  Vec3 offset = Vec3::Zero();                               // t
+struct alignas(64) PairState {
   Vec3 force = Vec3::Zero();                                // N, on j; minus it on i
   std::array<Vec3, 2> turning{Vec3::Zero(), Vec3::Zero()};  // dU/dn_i, dU/dn_j [J]
+  Vec3 normal = Vec3::Zero();
+  Vec3 offset = Vec3::Zero();  // t
+  double gap = 0;              // m
+  double weight = 0;           // kappa A_i A_j K w [N/m]
+  double energy = 0;           // J
+  double pressure = 0;         // N, magnitude of the force along the normal
+  double stiffness = 0;        // N/m
+  double share = 0;            // of the soft part: its slope in that of the linear range
   // Of the geometry, for press(): d . n [m]; |b|, 0 for balls; derivatives of the weight by half of t^2 [N/m^3],
   // its sign turned, and by c [N/m].
   double along = 0, length = 0, narrowing = 0, facing_slope = 0;
+  bool near = false;  // within the kernel and facing; else the rest is not set
+  bool deep = false;  // near, but deeper than the limit: of the rest only the gap holds
 };
 
 // `allowed` [m]: p, penetration without pressure (initial-penetration release); `soft` [m]: delta_0, where it is

@@ -14,6 +14,7 @@ namespace flexel::simulate {
 // separated. Its force would release energy that no approach has stored.
 enum class PairPhase : std::uint8_t { separated, approaching, penetrated };
 
+// A row of simulate/kernels/kernel_contact.h.
 struct PairRecord {
   static constexpr double kFree = -1;
   std::uint64_t key = 0;
@@ -29,6 +30,7 @@ struct PairRecord {
 
 class PairMemory {
  public:
+  [[nodiscard]] PairRecord* data() { return records_.data(); }
   [[nodiscard]] PairRecord& operator[](std::size_t pair) { return records_[pair]; }
   [[nodiscard]] const PairRecord& operator[](std::size_t pair) const { return records_[pair]; }
 

@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <numeric>
 #include <utility>
+
+#include "base/instruction_set.h"
 
 namespace flexel::simulate {
 namespace {
@@ -18,7 +21,22 @@ constexpr double kHardened = 1.01;     // of the least softness, at which that i
 constexpr double kNoTurn = 1e-9;       // of a body in a step
 constexpr double kShapelessEntry = 0.05;  // spacings; most penetration with which shapeless points approach
 
+static_assert(sizeof(ContactSide) == sizeof(double) * contact_kernels::kSideRow &&
+              sizeof(PointState) == sizeof(double) * contact_kernels::kPointRow &&
+              sizeof(PairConstants) == sizeof(double) * contact_kernels::kConstantsRow &&
+              sizeof(PairState) == sizeof(double) * contact_kernels::kStateRow);
+
 }  // namespace
+
+const contact_kernels::ContactTable& contact_kernel_table() {
+  using namespace contact_kernels;
+#if defined(__x86_64__)
+  static const ContactTable& best = best_table(&contacts_portable, &contacts_avx2, &contacts_avx512);
+  return best;
+#else
+  return contacts_portable();
+#endif
+}
 
 PairStates::PairStates(const ContactSettings& settings, const ContactSurface& surface, const PairList& list,
                        PairMemory& memory, OverlapRelease& release)
@@ -42,8 +60,11 @@ void PairStates::reset() {
   schedule_.reset(bodies, planes + 1, surface_.narrowest());
   moved_from_.clear();
   cells_.reset(list_);
-  shapes_.resize(cells_.cells().size());
-  shape_evaluation_.assign(cells_.cells().size(), 0);
+  sides_.clear();
+  for (const ContactPair& pair : list_.pairs())
+    sides_.push_back({pair.i, pair.of_plane() ? pair.plane : pair.j, pair.of_plane() ? 1u : 0u});
+  planes_.clear();
+  for (const ContactPlane& plane : settings_.planes) planes_.push_back({plane.point, plane.normal, 1, 0});
 }
 
 // Since the last evaluation; without one in this list, none. The common way is that of the middle of all.
@@ -115,7 +136,7 @@ void PairStates::update(const State& state, bool all) {
     schedule_.wake_all();
   else
     schedule_.advance(motions);
-  find_points();
+  find_points(state);
   if (release_.known_parts() < surface_.body().parts.size()) find_initial_penetrations(state);
   const std::vector<double> before = release_.advance(state);
   for (const std::uint32_t p : active_) is_active_[p] = states_[p].pressure > 0 ? kWasPressed : 0;
@@ -129,72 +150,109 @@ void PairStates::update(const State& state, bool all) {
 }
 
 // Of the pairs that are awake.
-void PairStates::find_points() {
+void PairStates::find_points(const State& state) {
   wanted_points_.clear();
-  wanted_cells_.clear();
   const auto want = [&](std::uint32_t point) {
-    if (std::exchange(point_evaluation_[point], evaluations_) == evaluations_) return;
-    wanted_points_.push_back(point);
-    const std::uint32_t cell = cells_.points()[point].cell;
-    if (std::exchange(shape_evaluation_[cell], evaluations_) != evaluations_) wanted_cells_.push_back(cell);
+    if (std::exchange(point_evaluation_[point], evaluations_) != evaluations_)
+      wanted_points_.push_back(point);
   };
   for (const std::uint32_t p : schedule_.awake()) {
-    const ContactPair& pair = list_.pairs()[p];
-    want(pair.i);
-    if (!pair.of_plane()) want(pair.j);
+    const contact_kernels::PairSides& of = sides_[p];
+    want(of.i);
+    if (!of.of_plane) want(of.j);
   }
-  parallel_for_each(
-      wanted_cells_.size(),
-      [&](std::size_t n) {
-        const std::uint32_t c = wanted_cells_[n];
-        const CarryingCell& cell = cells_.cells()[c];
-        shapes_[c] = surface_.shape_at(list_.points()[cell.point],
-                                       cell.deforms() ? cells_.gradient(c, moved_from_) : Mat3(Mat3::Zero()));
-      },
-      512);
-  parallel_for_each(
-      wanted_points_.size(),
-      [&](std::size_t n) {
-        const std::uint32_t point = wanted_points_[n];
-        points_[point] = surface_.at(list_.points()[point], cells_.at_point(point, moved_from_),
-                                     shapes_[cells_.points()[point].cell]);
-      },
-      512);
+  if (points_.empty()) return;
+  parallel_chunks(wanted_points_.size(), Batch::kMost, [&](std::size_t begin, std::size_t end) {
+    contact_kernel_table().place(cells_.points().data(), wanted_points_.data() + begin, end - begin,
+                                 state.displacement.data()->data(),
+                                 reinterpret_cast<double*>(points_.data()));
+  });
+}
+
+contact_kernels::PairView PairStates::view(const std::uint32_t* pairs, std::size_t count) const {
+  return {pairs,
+          count,
+          sides_.data(),
+          reinterpret_cast<const char*>(&list_.pairs().front().properties.constants),
+          sizeof(ContactPair),
+          reinterpret_cast<const double*>(points_.data()),
+          reinterpret_cast<const double*>(planes_.data())};
 }
 
 // Of the pairs that are awake. Returns (pairs; empty without release) 1 for those that come near inside each
 // other during a release; they are not evaluated yet.
 std::vector<std::uint8_t> PairStates::evaluate_pairs() {
-  const std::vector<ContactPair>& pairs = list_.pairs();
   const std::vector<std::uint32_t>& awake = schedule_.awake();
-  std::vector<std::uint8_t> entering(release_.share_count() == 0 ? 0 : pairs.size(), 0);
-  parallel_for_each(
-      awake.size(),
-      [&](std::size_t n) {
-        const std::uint32_t p = awake[n];
-        PairRecord& record = memory_[p];
-        if (is_active_[p] == kWasPressed) {  // it cannot sleep
-          schedule_.keep_awake(p);
-          set(p, evaluate(pairs[p], release_.allowed(pairs[p], record), record.soft));
-          return;
-        }
-        const PairProximity proximity = pair_proximity(pairs[p], record);
-        const bool sleeps = schedule_.sleep(p, proximity.safe);
-        if (!proximity.near || (sleeps && !evaluated_all_)) {
-          if (frozen_) return;
-          record.phase = proximity.near ? PairPhase::approaching : PairPhase::separated;
-          record.soft = 0;
-          return;
-        }
-        const PairState now = evaluate(pairs[p], release_.allowed(pairs[p], record), record.soft);
-        const bool enters = now.near && !now.deep && now.gap < 0 && record.phase == PairPhase::separated;
-        if (enters && record.penetration == 0 && release_.is_releasing(pairs[p]))
-          entering[p] = 1;
-        else
-          set(p, now);
-      },
-      256);
+  std::vector<std::uint8_t> entering(release_.share_count() == 0 ? 0 : list_.pairs().size(), 0);
+  parallel_chunks(awake.size(), Batch::kMost, [&](std::size_t begin, std::size_t end) {
+    Batch batch;
+    std::array<std::uint32_t, Batch::kMost> others;
+    std::size_t count = 0;
+    for (std::size_t n = begin; n < end; ++n) {
+      const std::uint32_t p = awake[n];
+      if (is_active_[p] != kWasPressed) {
+        others[count++] = p;
+        continue;
+      }
+      schedule_.keep_awake(p);  // it cannot sleep
+      add_to(batch, p);
+    }
+    look_at({others.data(), count}, batch);
+    evaluate_batch(batch, entering);
+  });
   return entering;
+}
+
+void PairStates::add_to(Batch& batch, std::uint32_t pair) const {
+  batch.allowed[batch.count] = release_.allowed(list_.pairs()[pair], memory_[pair]);
+  batch.soft[batch.count] = memory_[pair].soft;
+  batch.pairs[batch.count++] = pair;
+}
+
+// Lets those sleep that can, and puts those in the batch that may be near.
+void PairStates::look_at(std::span<const std::uint32_t> pairs, Batch& batch) {
+  if (pairs.empty()) return;
+  std::array<double, Batch::kMost> pressed, path, turn;
+  std::array<std::uint8_t, Batch::kMost> near;
+  for (std::size_t n = 0; n < pairs.size(); ++n) {
+    // what can stick begins to at that gap
+    const PairProperties& of = list_.pairs()[pairs[n]].properties;
+    pressed[n] = of.constants.law.softened(memory_[pairs[n]].soft).ahead +
+                 (of.pull_off > 0 ? of.constants.law.soft : 0);
+  }
+  contact_kernel_table().look(view(pairs.data(), pairs.size()), pressed.data(), path.data(), turn.data(),
+                              near.data());
+  for (std::size_t n = 0; n < pairs.size(); ++n) {
+    const std::uint32_t p = pairs[n];
+    PairRecord& record = memory_[p];
+    // what sticks pulls, and what was inside must be seen to come out
+    const bool watched = record.sticks() || record.phase == PairPhase::penetrated;
+    const bool sleeps =
+        schedule_.sleep(p, watched && near[n] ? SafeMotion{0, 0} : SafeMotion{path[n], turn[n]});
+    if (near[n] && (!sleeps || evaluated_all_)) {
+      add_to(batch, p);
+    } else if (!frozen_) {
+      record.phase = near[n] ? PairPhase::approaching : PairPhase::separated;
+      record.soft = 0;
+    }
+  }
+}
+
+void PairStates::evaluate_batch(const Batch& batch, std::vector<std::uint8_t>& entering) {
+  if (batch.count == 0) return;
+  contact_kernel_table().evaluate(view(batch.pairs.data(), batch.count), batch.allowed.data(),
+                                  batch.soft.data(), reinterpret_cast<double*>(states_.data()));
+  for (std::size_t n = 0; n < batch.count; ++n) {
+    const std::uint32_t p = batch.pairs[n];
+    const PairState& now = states_[p];
+    const PairRecord& record = memory_[p];
+    const bool enters = is_active_[p] != kWasPressed && now.near && !now.deep && now.gap < 0 &&
+                        record.phase == PairPhase::separated && record.penetration == 0;
+    if (enters && release_.is_releasing(list_.pairs()[p]))
+      entering[p] = 1;
+    else
+      settle(p);
+  }
 }
 
 void PairStates::admit(const std::vector<std::uint8_t>& entering) {
@@ -228,11 +286,17 @@ void PairStates::find_initial_penetrations(const State& state) {
       512);
 }
 
-void PairStates::set(std::size_t pair, PairState now) {
+void PairStates::set(std::size_t pair, const PairState& now) {
+  states_[pair] = now;
+  settle(pair);
+}
+
+// What a pair's new state means for its phase.
+void PairStates::settle(std::size_t pair) {
+  PairState& now = states_[pair];
   PairPhase phase = memory_[pair].phase;
   const bool passed = frozen_ && now.near && now.deep && phase == PairPhase::approaching;
   if (!passed) update_phase(list_.pairs()[pair], now, phase);
-  states_[pair] = now;
   is_active_[pair] = now.near;
   if (frozen_) return;
   memory_[pair].phase = phase;
@@ -314,64 +378,6 @@ void PairStates::finish_step(const State& state, double drift) {
       },
       512);
   for (const double each : lost_) hardened_ += each;
-}
-
-// In the terms of pair_law.h. Beside a common way points go by at most kPoint times their bodies' paths; normals
-// change by at most |F^-1| times their bodies' turns, and the direction of contact, the mean of both, by twice
-// the larger of these over its length. Gap, offset and facing change accordingly; half of what there is may be
-// used up by either. kBounds covers that F^-1 changes meanwhile, by turns up to kMostTurn over it: integral of
-// dx / (1 - x) < kBounds x. What has no sure normal is known by its distance alone.
-PairStates::PairProximity PairStates::pair_proximity(const ContactPair& pair,
-                                                     const PairRecord& record) const {
-  constexpr double kRounding = 1e-9, kPoint = 1.2, kBounds = 1.5, kMostTurn = 0.3;
-  const PairConstants& constants = pair.properties.constants;
-  const ContactSide i = own_side(pair), j = other_side(pair);
-  const double rate_i = points_[pair.i].normal_rate,
-               rate_j = pair.of_plane() ? 0 : points_[pair.j].normal_rate, fastest = std::max(rate_i, rate_j);
-  const Vec3 d = j.position - i.position, b = i.own_plane * i.normal - j.own_plane * j.normal;
-  const double distance = d.norm(), length = b.norm(), width = constants.width;
-  PairProximity found;
-  const auto bear = [&](double margin, double rate) {
-    if (!std::isfinite(rate)) return;
-    const SafeMotion safe =
-        rate > 0 ? SafeMotion{0.5 * margin / kPoint, std::min(0.5 * margin / rate, kMostTurn / fastest)}
-                 : SafeMotion{margin / kPoint};
-    if (std::min(safe.path, safe.turn) > std::min(found.safe.path, found.safe.turn)) found.safe = safe;
-  };
-  // what can stick begins to at that gap
-  const double pressed =
-      constants.law.softened(record.soft).ahead + (pair.properties.pull_off > 0 ? constants.law.soft : 0);
-  const double far = std::max(width, constants.limit);
-  if (width > 0) bear(distance - std::sqrt(width * width + far * far), 0);
-  if (i.radius > 0 && j.radius > 0) {
-    bear(distance - i.radius - j.radius - pressed, 0);
-  } else if (length > 0) {
-    const double along = d.dot(b) / length;
-    const double turning = std::max(i.own_plane > 0 ? rate_i : 0, j.own_plane > 0 ? rate_j : 0);
-    // of a pair of points the other one may get a plane of its own
-    const double rate = pair.of_plane()          ? 0
-                        : std::isfinite(fastest) ? 2 * kBounds * distance * turning / length
-                                                 : fastest;
-    const double offset2 = d.squaredNorm() - along * along;
-    bear(along - i.radius - j.radius - pressed, rate);
-    if (width > 0) {
-      if (offset2 > width * width + kRounding * (width * width + distance * distance)) found.near = false;
-      bear(std::sqrt(std::max(offset2, 0.0)) - width, 2 * rate);
-    }
-  } else {
-    found.near = false;  // two that have no plane of their own
-  }
-  if (i.normal != Vec3::Zero() && j.normal != Vec3::Zero()) {
-    const double facing = -i.normal.dot(j.normal);
-    if (!(facing > constants.facing_from)) found.near = false;
-    const double margin = std::min((constants.facing_from - facing) / kBounds, kMostTurn) / fastest;
-    if (std::isfinite(fastest) && fastest > 0 && margin > std::min(found.safe.path, found.safe.turn))
-      found.safe = {std::numeric_limits<double>::infinity(), margin};
-  }
-  // what sticks pulls, and what was inside must be seen to come out
-  const bool watched = record.sticks() || record.phase == PairPhase::penetrated;
-  if (watched && found.near) found.safe = {0, 0};
-  return found;
 }
 
 }  // namespace flexel::simulate

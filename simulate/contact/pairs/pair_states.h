@@ -8,6 +8,9 @@
 
 namespace flexel::simulate {
 
+// Of this machine.
+[[nodiscard]] const contact_kernels::ContactTable& contact_kernel_table();
+
 class PairStates {
  public:
   // All outlive this. The phases of pairs are kept in `memory`, where initial penetrations are entered too.
@@ -45,17 +48,24 @@ class PairStates {
   [[nodiscard]] const PairState& operator[](std::size_t pair) const { return states_[pair]; }
   // Evaluated pairs whose state is `near`, ascending: most candidates are not.
   [[nodiscard]] const std::vector<std::uint32_t>& active() const { return active_; }
+  [[nodiscard]] const std::vector<contact_kernels::PairSides>& sides() const { return sides_; }  // (pairs)
   [[nodiscard]] bool is_active(std::size_t pair) const { return is_active_[pair] != 0; }
+  [[nodiscard]] contact_kernels::PairView view(const std::uint32_t* pairs, std::size_t count) const;
 
  private:
-  struct PairProximity {
-    bool near = true;  // false for certain: beyond the kernel, or turned away
-    SafeMotion safe;   // before which it cannot press
-  };
   [[nodiscard]] std::span<const BodyMotion> motion_to(const State& state);
   [[nodiscard]] Box body_box(std::size_t body) const;
-  void find_points();
-  [[nodiscard]] PairProximity pair_proximity(const ContactPair& pair, const PairRecord& record) const;
+  void find_points(const State& state);
+  // The numbers of pairs that are evaluated together, and what they are evaluated with.
+  struct Batch {
+    static constexpr std::size_t kMost = 256;
+    std::array<std::uint32_t, kMost> pairs;
+    std::array<double, kMost> allowed, soft;
+    std::size_t count = 0;
+  };
+  void look_at(std::span<const std::uint32_t> pairs, Batch& batch);
+  void add_to(Batch& batch, std::uint32_t pair) const;
+  void evaluate_batch(const Batch& batch, std::vector<std::uint8_t>& entering);
   [[nodiscard]] ContactSide other_side(const ContactPair& pair) const;
   [[nodiscard]] ContactSide own_side(const ContactPair& pair) const;
   // `allowed` [m]: penetration without pressure; `soft` [m]: of PairRecord.
@@ -67,7 +77,8 @@ class PairStates {
   void find_initial_penetrations(const State& state);
   [[nodiscard]] std::vector<std::uint8_t> evaluate_pairs();
   void admit(const std::vector<std::uint8_t>& entering);
-  void set(std::size_t pair, PairState now);
+  void set(std::size_t pair, const PairState& now);
+  void settle(std::size_t pair);
   void update_phase(const ContactPair& pair, PairState& now, PairPhase& phase) const;
 
   const ContactSettings& settings_;
@@ -77,12 +88,12 @@ class PairStates {
   OverlapRelease& release_;
   PairSchedule schedule_;
   CarryingCells cells_;
-  std::vector<CellShape> shapes_;                            // (cells) of points that are awake
-  std::vector<std::uint64_t> shape_evaluation_;              // (cells) that they are of
-  std::vector<std::uint32_t> wanted_points_, wanted_cells_;  // of the evaluation
-  std::vector<PointState> points_;                           // of pairs that are awake
-  std::vector<std::uint64_t> point_evaluation_;              // (points_) that they are of
-  std::vector<PairState> states_;                            // of active pairs
+  std::vector<contact_kernels::PairSides> sides_;  // (pairs)
+  std::vector<ContactSide> planes_;                // (settings_.planes)
+  std::vector<std::uint32_t> wanted_points_;       // of the evaluation
+  std::vector<PointState> points_;                 // of pairs that are awake
+  std::vector<std::uint64_t> point_evaluation_;    // (points_) that they are of
+  std::vector<PairState> states_;                  // of active pairs
   std::vector<std::uint32_t> active_;
   static constexpr std::uint8_t kWasPressed = 2;  // in the evaluation before, while pairs are evaluated
   std::vector<std::uint8_t> is_active_;           // (pairs)

@@ -74,6 +74,10 @@ void ContactSurface::find_cells() {
   }
 }
 
+bool ContactSurface::broken(std::uint32_t point) const {
+  return cell_[point] != kNoCarrier && body_.broken[cell_[point]] != 0;
+}
+
 std::size_t ContactSurface::broken_cells() const {
   return static_cast<std::size_t>(
       std::count_if(cells_.begin(), cells_.end(), [&](std::uint32_t c) { return body_.broken[c] != 0; }));
@@ -98,9 +102,8 @@ CellShape ContactSurface::shape_at(std::uint32_t point, const Mat3& gradient) co
   const Mat3 f = Mat3::Identity() + gradient;
   // The remains of a broken cell may have any shape and direction: whole faces and planes touch its points as
   // they touch those of edges, from all sides.
-  const bool broken = cell_[point] != kNoCarrier && body_.broken[cell_[point]] != 0;
   const double volume = f.determinant(), stretch = f.squaredNorm();
-  shape.shapeless = broken || !(volume > kLeastVolume && stretch < kMostStretch);
+  shape.shapeless = broken(point) || !(volume > kLeastVolume && stretch < kMostStretch);
   if (!shape.shapeless) shape.inverse = f.inverse();
   if (shape.shapeless || volume < 3 * kLeastVolume || stretch > 0.5 * kMostStretch) {
     shape.normal_rate = std::numeric_limits<double>::infinity();

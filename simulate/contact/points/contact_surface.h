@@ -19,10 +19,12 @@ struct CellShape {
   double normal_rate = 0;
 };
 
-// A contact point in a state.
-struct PointState : CellShape {
+struct SideState {
   ContactSide side;
 };
+
+// A contact point in a state: a row of simulate/kernels/kernel_contact.h.
+struct alignas(64) PointState : SideState, CellShape {};
 
 // A part that does not deform.
 struct RigidPart {
@@ -55,6 +57,7 @@ class ContactSurface {
   [[nodiscard]] CellShape shape_at(std::uint32_t point, const Mat3& gradient) const;
   // `displacement` [m] of the point.
   [[nodiscard]] PointState at(std::uint32_t point, const Vec3& displacement, const CellShape& shape) const;
+  [[nodiscard]] bool broken(std::uint32_t point) const;  // the cell that carries it
   // Of those that carry points.
   [[nodiscard]] std::size_t broken_cells() const;
 
