@@ -20,7 +20,8 @@ namespace flexel::simulate {
 
 constexpr double kTangential = 0.8;  // stiffness of a pair along the surface, of that along the normal
 
-// Of a point in a pair that rubs: m/s; dv/dx of its cell [1/s]. Rows of simulate/kernels/kernel_contact.h, as the next one.
+// Of a point in a pair that rubs: m/s; dv/dx of its cell [1/s]. Rows of simulate/kernels/kernel_contact.h, as those
+// of the next one.
 struct alignas(64) PointMotion {
   Vec3 velocity = Vec3::Zero();
   Mat3 gradient = Mat3::Zero();

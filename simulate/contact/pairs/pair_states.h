@@ -8,7 +8,8 @@
 
 namespace flexel::simulate {
 
-[[nodiscard]] const contact_kernels::ContactTable& contact_kernel_table();  // of this machine
+// Of this machine.
+[[nodiscard]] const contact_kernels::ContactTable& contact_kernel_table();
 
 class PairStates {
  public:
