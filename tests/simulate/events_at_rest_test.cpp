@@ -208,6 +208,9 @@ TEST(Strength, TheLeastLimitCounts) {
   EXPECT_TRUE(told(1e3, 1e4, 0).yields);
   EXPECT_EQ(told(1e3, 0, 0).share, 2);
   EXPECT_EQ(told(0, 1e3, 0).share, 2);
+  const std::string gum = "[materials.gum]\nyoung = \"1 MPa\"\npoisson = 0.3\ndensity = \"1000 kg/m3\"\n";
+  EXPECT_NO_THROW((void)parse_scene(gum + "strength = \"2 kPa\"\nlayer_strength = \"1 kPa\"\n", "s.toml"));
+  EXPECT_THROW((void)parse_scene(gum + "layer_strength = \"1 kPa\"\n", "s.toml"), InputError);
   Part other = body.parts[0];
   other.name = "other";
   const std::uint32_t half = other.element_end / 2;
