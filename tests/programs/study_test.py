@@ -15,6 +15,7 @@ import subprocess
 import time
 
 from browser import chromium
+from browser_test import expect_silence
 from harness import BIN, SCENE, box, expect, expect_error, expect_ok, expect_only, main, need, run, scene, write
 
 TARGETS = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5]
@@ -236,7 +237,7 @@ def expect_the_finest_run_is_shown():
             viewer.choose("colour", "displacement")
             seen = viewer.picture()
             expect(seen["share"] > 0.02 and seen["colours"] > 20, f"it is drawn: {seen}")
-            expect(viewer.console() == [], f"in silence: {viewer.console()}")
+            expect_silence(viewer)
 
 
 def expect_a_browser_prints_it():

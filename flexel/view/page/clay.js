@@ -328,7 +328,7 @@ export class Clay {
   // The points where their elements carry them.
   bend(positions) {
     const {shape} = this, {carriers, weights} = shape, moved = shape.live ?? new Float32Array(3 * shape.count);
-    const from = this.carriedRest ??= this.carriedFrom();
+    const from = this.carriedRest = this.carriedRest ?? this.carriedFrom();
     for (let p = 0, i = 0, a = 0; p < shape.count; ++p, i += 3) {
       let x = -from[i], y = -from[i + 1], z = -from[i + 2];
       for (const end = a + kCorners; a < end; ++a) {

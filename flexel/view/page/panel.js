@@ -18,7 +18,7 @@ function attribute(array, size) {
 class Drawing {
   constructor(shape, colours, clip, tint, slow) {
     this.shape = shape;
-    this.side = slow && looksOutwards(shape) ? THREE.FrontSide : THREE.DoubleSide;
+    this.side = slow && (shape.outwards = shape.outwards ?? looksOutwards(shape)) ? THREE.FrontSide : THREE.DoubleSide;
     this.position = attribute(new Float32Array(3 * shape.count), 3);
     this.normal = attribute(new Float32Array(3 * shape.count), 3);
     this.value = attribute(new Float32Array(shape.count), 1);
