@@ -114,7 +114,7 @@ def main():
     text = f"""# Memory: told before a run, and taken
 
 Written by `bench/memory.py`: what `flexel-simulate --explain` says beside the largest resident size of the process. Parts: a bar of 40 x 10 x 10 mm, a plate of 40 x 40 x 6 with a block of 16 x 16 x 16 on it, a sheet of 60 x 60 x 1,
-on lattices that do not fit their faces. What `--max-memory` refuses before a run is what is told here, by more than {OFF} ([exit-codes.md](../reference/exit-codes.md)).
+on lattices that fit their faces (1 mm) and do not (0.7 mm). What `--max-memory` refuses before a run is what is told here, by more than {OFF} ([exit-codes.md](../reference/exit-codes.md)).
 
 {len(ratios)} runs: {min(ratios):.2f} to {max(ratios):.2f} of what was taken; {wrong} off by more than {OFF}. With model `quadratic` a run between small and large deflections takes something between.
 
