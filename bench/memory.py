@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """What flexel-simulate says that a run needs (`--explain`), beside the most memory that it had: docs/measurements/memory.md.
 
-    PATH=build/release/bin:$PATH bench/memory.py [--size 1 --size 0.7] [-o docs/measurements/memory.md] [ROW...]
+    PATH=build/release/bin:$PATH bench/memory.py [--size 1 --size 0.7] [--keep DIR] [-o docs/measurements/memory.md] [ROW...]
 
-Each row is a scene on a lattice of each size [mm]. Without -o the table is printed. Exit code 1: a figure is off by more than 1.3. Five minutes.
+Each row is a scene on a lattice of each size [mm], those that take long on the coarsest. --keep: results in a folder, with which a run that was stopped
+goes on. Without -o the table is printed. Exit code 1: a figure is off by more than 1.3. Five minutes.
 """
 
 import argparse
@@ -15,7 +16,8 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "tests/programs"))
+sys.path[:0] = [str(ROOT / "tests/programs"), str(ROOT / "bench/accuracy")]
+from kept import Kept  # noqa: E402
 from shapes import binary_stl, box_triangles  # noqa: E402
 
 OFF = 1.3
@@ -58,6 +60,7 @@ ROWS = {  # parts, options of flexel-voxelize, scene
     "an indenter, `cells`": (["plate"], [], BALL),
     "an indenter, `springs`": (["plate"], [], 'model = "springs"\n' + BALL),
 }
+LONG = ("contact at equilibrium", "contact in implicit steps", "a tool in implicit steps", "`quadratic`, large deflection")
 UNITS = {"kB": 1e3, "MB": 1e6, "GB": 1e9}
 
 
@@ -94,22 +97,24 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("rows", nargs="*", metavar="ROW", help="those whose name has this in it; all without")
     parser.add_argument("--size", type=float, action="append", help="of cells, mm (1 and 0.7)")
+    parser.add_argument("--keep", type=pathlib.Path)
     parser.add_argument("-o", "--output", type=pathlib.Path)
     arguments = parser.parse_args()
+    sizes, kept = arguments.size or [1, .7], Kept(arguments.keep)
     names = [name for name in ROWS if not arguments.rows or any(row in name for row in arguments.rows)]
     lines, ratios = [], []
     with tempfile.TemporaryDirectory() as place:
         for name in names:
-            for size in arguments.size or [1, .7]:
-                elements, told, taken = measure(name, size, pathlib.Path(place))
+            for size in [max(sizes)] if name in LONG else sizes:
+                elements, told, taken = kept(f"{name} {size:g}", lambda: measure(name, size, pathlib.Path(place)))
                 ratios.append(told / taken)
-                lines.append(f"| {name} | {size} | {elements} | {told / 1e6:.1f} | {taken / 1e6:.1f} | {told / taken:.2f} |")
+                lines.append(f"| {name} | {size:g} | {elements} | {told / 1e6:.1f} | {taken / 1e6:.1f} | {told / taken:.2f} |")
                 print(lines[-1], flush=True)
     wrong = sum(not 1 / OFF < ratio < OFF for ratio in ratios)
     text = f"""# Memory: told before a run, and taken
 
 Written by `bench/memory.py`: what `flexel-simulate --explain` says beside the largest resident size of the process. Parts: a bar of 40 x 10 x 10 mm, a plate of 40 x 40 x 6 with a block of 16 x 16 x 16 on it, a sheet of 60 x 60 x 1,
-on lattices that do not fit their faces. What `--max-memory` refuses before a run is what is told here, by more than {OFF} ([exit-codes.md](../reference/exit-codes.md)).
+on lattices that fit their faces (1 mm) and do not (0.7 mm). What `--max-memory` refuses before a run is what is told here, by more than {OFF} ([exit-codes.md](../reference/exit-codes.md)).
 
 {len(ratios)} runs: {min(ratios):.2f} to {max(ratios):.2f} of what was taken; {wrong} off by more than {OFF}. With model `quadratic` a run between small and large deflections takes something between.
 
