@@ -307,8 +307,8 @@ def test_a_series_does_not_replace_its_inputs():
     os.symlink("run_00000.vtu", "link_00007.vtu")
     scene("scene.toml", 'material = "rubber"\n[run]\ntime = "0.1 ms"\nframes = 1\n')
     for command in (["flexel", "import-lammps", "run.dump", "run_00000.vtu"], ["flexel-simulate", "scene.toml", "run_00000.vtu"]):
-        for series in ("run.pvd", "link.pvd"):
-            expect_error(run(*command, "-o", series), command[0], series, "run_00000.vtu", "--force")
+        for series, frame in (("run.pvd", "run_00000.vtu"), ("link.pvd", "link_00007.vtu")):
+            expect_error(run(*command, "-o", series), command[0], series, frame, "--force")
         expect_ok(run(*command, "-o", "ru.pvd"))
     expect((vtu_arrays("run_00000.vtu")["points/position"] == positions).all(), "the body was replaced")
     expect_ok(run("flexel", "import-lammps", "run.dump", "run_00000.vtu", "--force", "-o", "run.pvd"))
