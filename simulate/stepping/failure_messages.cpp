@@ -15,6 +15,9 @@ std::string place(const Vec3& at) {
   return fmt::format("({}, {}, {})", human_length(at.x()), human_length(at.y()), human_length(at.z()));
 }
 
+constexpr const char* kGainsEnergy =
+    "method = \"explicit\" gains energy by itself: leave it out, or damp it ([damping])";
+
 SmallestJacobian smallest(const Problem& problem, const State& state) {
   const Stencil none;
   return Cells(problem, none).smallest_jacobian(state);
@@ -26,20 +29,20 @@ Vec3 rest_of(const Problem& problem, std::uint32_t cell) {
 
 }  // namespace
 
-std::string folds_at(const char* what, const Vec3& at) {
+std::string folds_at(const char* what, const Vec3& at, TimeMethod method) {
   return fmt::format(
-      "{} near {} turned inside out: load it more slowly, damp it ([damping]), or use a shorter [run] step "
-      "or "
-      "a smaller spacing",
-      what, place(at));
+      "{} near {} turned inside out: {}", what, place(at),
+      method == TimeMethod::explicit_euler
+          ? kGainsEnergy
+          : "load it more slowly, damp it ([damping]), or use a shorter [run] step or a smaller "
+            "spacing");
 }
 
 std::string runs_away_at(const Vec3& at, TimeMethod method) {
-  return fmt::format(
-      "the motion ran away, farthest near {}: {}", place(at),
-      method == TimeMethod::explicit_euler
-          ? "method = \"explicit\" gains energy by itself: leave it out, or damp it ([damping])"
-          : "look at loads and units, or give a shorter [run] step");
+  return fmt::format("the motion ran away, farthest near {}: {}", place(at),
+                     method == TimeMethod::explicit_euler
+                         ? kGainsEnergy
+                         : "look at loads and units, or give a shorter [run] step");
 }
 
 std::string fastest_near(const Body& body, const State& state) {
@@ -49,7 +52,7 @@ std::string fastest_near(const Body& body, const State& state) {
   return place(body.rest[fastest]);
 }
 
-std::string where_it_folds(const Problem& problem, const State& state) {
+std::string where_it_folds(const Problem& problem, const State& state, TimeMethod method) {
   if (problem.body.cell_count() == 0) return "an element's position is not a number";
   const Stencil none;
   const DrawnChains drawn = Cells(problem, none).drawn_chains(state);
@@ -59,7 +62,7 @@ std::string where_it_folds(const Problem& problem, const State& state) {
         "slowly, "
         "damp it ([damping]), or use a shorter [run] step",
         place(rest_of(problem, drawn.cell)));
-  return folds_at("a cell", rest_of(problem, smallest(problem, state).cell));
+  return folds_at("a cell", rest_of(problem, smallest(problem, state).cell), method);
 }
 
 std::string squeezed_most(const Problem& problem, const State& state) {

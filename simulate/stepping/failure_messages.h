@@ -8,13 +8,13 @@
 namespace flexel::simulate {
 
 // "`what` near (...) turned inside out", `at` [m] at rest, and what to do about it.
-[[nodiscard]] std::string folds_at(const char* what, const Vec3& at);
+[[nodiscard]] std::string folds_at(const char* what, const Vec3& at, TimeMethod method);
 
 // "the motion ran away near (...)", `at` [m] at rest, and what to do about it.
 [[nodiscard]] std::string runs_away_at(const Vec3& at, TimeMethod method);
 
 // That of the cell with the least volume.
-[[nodiscard]] std::string where_it_folds(const Problem& problem, const State& state);
+[[nodiscard]] std::string where_it_folds(const Problem& problem, const State& state, TimeMethod method);
 
 // "(...)": where the element rests that moves fastest.
 [[nodiscard]] std::string fastest_near(const Body& body, const State& state);

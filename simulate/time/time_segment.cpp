@@ -199,7 +199,7 @@ void TimeSegment::look() {
 void TimeSegment::choose_step(Clock& clock) {
   look();
   const double longest = bound_->longest(staged_.has_value());
-  if (!(longest > 0)) throw DivergedError(where_it_folds(problem_, state_));
+  if (!(longest > 0)) throw DivergedError(where_it_folds(problem_, state_, scene_.run.method));
   double step = kShareOfBound * longest;
   if (euler_) {
     step = scene_.run.step.value_or(*scene_.run.time / kImplicitSteps);
@@ -219,8 +219,8 @@ void TimeSegment::choose_step(Clock& clock) {
   // without stiffness there is no bound: a thousand steps draw the path
   if (!std::isfinite(step)) step = *scene_.run.time / 1000;
   if (!(step > 1e-12 * *scene_.run.time))
-    throw DivergedError(
-        fmt::format("the stable step has fallen to {:.3g} s: {}", step, where_it_folds(problem_, state_)));
+    throw DivergedError(fmt::format("the stable step has fallen to {:.3g} s: {}", step,
+                                    where_it_folds(problem_, state_, scene_.run.method)));
   clock.step = left / std::max(1.0, std::ceil(left / step - 1e-9));
 }
 
@@ -238,7 +238,8 @@ void TimeSegment::refuse_unsound() {
     throw DivergedError(runs_away_at(body_.rest[where], scene_.run.method));
   if (euler_) return;  // its steps end with every cell the right way round
   look();
-  if (!(bound_->longest(staged_.has_value()) > 0)) throw DivergedError(where_it_folds(problem_, state_));
+  if (!(bound_->longest(staged_.has_value()) > 0))
+    throw DivergedError(where_it_folds(problem_, state_, scene_.run.method));
 }
 
 void TimeSegment::adapt_step(Clock& clock) {
@@ -301,7 +302,7 @@ const std::vector<Vec3>& TimeSegment::sum_forces(EnergyHistory* history) {
 void TimeSegment::add_connection_forces(EnergyHistory* history) {
   const ScopeTimer timer(paper_seconds_);
   if (const PaperModel::SmallestVolume least = paper_->smallest_volume(state_); !(least.value > 0))
-    throw DivergedError(folds_at("an element", body_.rest[least.element]));
+    throw DivergedError(folds_at("an element", body_.rest[least.element], scene_.run.method));
   paper_->add_forces(state_, outer_);
   if (!damps_connections()) return;
   add_apart(history ? &history->connection_damping() : nullptr,
@@ -437,7 +438,8 @@ void TimeSegment::step(Clock& clock, EnergyHistory* history, bool row) {
                    first ? 0 : clock.previous, clock.step, before == 0);
   }
   clock.previous = clock.step;
-  if (!(outcome.smallest_jacobian > 0)) throw DivergedError(where_it_folds(problem_, state_));
+  if (!(outcome.smallest_jacobian > 0))
+    throw DivergedError(where_it_folds(problem_, state_, scene_.run.method));
 }
 
 void TimeSegment::slow(double factor) {
