@@ -181,8 +181,10 @@ bool PulledBody::solve(const std::vector<ToolPose>& poses, double tolerance, int
   }
   accept(std::move(trial), poses, outcome.relative_residual);
   measure(mechanics_->forces(state_).total);
+  if (tolerance > kRest) return true;
   rested_ = state_.displacement;
   rested_poses_ = poses_;
+  rested_residual_ = residual_;
   return true;
 }
 
@@ -250,6 +252,7 @@ void PulledBody::accept(simulate::State state, const std::vector<ToolPose>& pose
 void PulledBody::retreat() {
   state_.displacement = rested_;
   poses_ = rested_poses_;
+  residual_ = rested_residual_;
   memory_ = {};
   lead_ties(poses_);
   measure(mechanics_->forces(state_).total);
