@@ -156,6 +156,7 @@ def test_the_scene_does_the_same_without_hands():
         first = saved(url, "part.stl")
         frame = hand.act("keep")
         expect(frame["kept"] == 1 and frame["tools"] == [] and not frame["said"], f"{frame['kept']} {frame['tools']} {frame['said']}")
+        expect(frame["settled"] and frame["residual"] <= 1e-8, f"nothing acts, and all is in balance: {frame['residual']}")
         expect(farthest(saved(url, "part.stl"), first) < 1e-3, "what is kept is the shape that was seen")
         hand.act("grab face bracket/2")
         base = hand.last["place"][-1]
