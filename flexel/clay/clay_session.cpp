@@ -34,7 +34,7 @@ using Json = nlohmann::ordered_json;
 constexpr std::size_t kMostWaiting = 256, kMostHolds = 64, kMostTools = 16, kMostUndo = 100,
                       kMostChanges = 64;
 constexpr std::size_t kMostUndoElements = 5'000'000;  // some 200 bytes each
-constexpr double kFollowTolerance = 1e-2, kDragTolerance = 1e-4, kTolerance = 1e-8;
+constexpr double kFollowTolerance = 1e-2, kDragTolerance = 1e-4;
 constexpr int kDragIterations = 12, kIterations = 40, kMostHalvings = 6;
 constexpr double kSpring = 10;     // times the part's stiffness
 constexpr double kBalance = 1e-4;  // of the way of the hand
@@ -265,6 +265,7 @@ bool ClaySession::wait(std::optional<Act>& act) {
 void ClaySession::run() {
   std::optional<Act> act;
   while (wait(act)) {
+    const bool leads = act || on_its_way();
     try {
       if (act)
         perform(*act);
@@ -276,7 +277,7 @@ void ClaySession::run() {
       said_ = error.what();
       stroke_ = {};
       const std::lock_guard lock(mutex_);
-      settle(!act);  // after an act that failed the part comes to rest where it is
+      settle(!leads);  // after an act or a way that failed the part comes to rest where it is
     }
     publish();
   }
@@ -286,13 +287,18 @@ void ClaySession::perform(const Act& act) {
   if (act.kind == Act::Kind::take) return;
   said_.clear();
   if (!is_motion(act)) {
-    if (act.kind != Act::Kind::undo && act.kind != Act::Kind::redo) arrive();
+    const bool travels = act.kind == Act::Kind::undo || act.kind == Act::Kind::redo;
+    if (!travels) arrive();
     stroke_ = {};
-    if (act.kind != Act::Kind::stay) change(act);
-    return;
+    if (act.kind == Act::Kind::stay) return;
+    if (!travels) rest();
+    return change(act);
   }
   if (document_.tools.empty()) throw InputError("no tool is there to be led: pull at a place first");
-  if (!stroke_.begun) remember();
+  if (!stroke_.begun) {
+    rest();
+    remember();
+  }
   stroke_.begun = true;
   const Clock::time_point now = Clock::now();
   const auto gap = now - moved_;  // between poses of a slow machine it does not rest
@@ -433,7 +439,7 @@ void ClaySession::keep(ClayDocument& next) const {
   if (!model_) throw InputError("nothing acts on the part: hold a face before its shape is kept");
   refuse_detour(next, base_);
   const std::vector<ToolPose> poses = model_->poses();
-  if (!model_->lead(poses, kTolerance, kIterations, [] { check_stop(); }))
+  if (!model_->lead(poses, kRest, kIterations, [] { check_stop(); }))
     throw InputError("the part is not at rest: its shape cannot be kept");
   auto body = std::make_shared<Body>(bent(next));
   for (std::size_t e = 0; e < body->element_count(); ++e)
@@ -472,7 +478,7 @@ void ClaySession::take_up(ClayDocument next) {
         std::vector<ToolPose> poses = led;
         if (step < steps)
           for (ToolPose& pose : poses) pose = pose * (double(step) / steps);
-        if (!model->lead(poses, kTolerance, kIterations, stop_asked())) return false;
+        if (!model->lead(poses, kRest, kIterations, stop_asked())) return false;
       }
       return true;
     };
@@ -569,13 +575,17 @@ void ClaySession::refine() {
   }
   if (on_its_way()) return lead();
   if (hand_moves()) return;
-  if (model_) {
-    if (!model_->lead(model_->poses(), kTolerance, kIterations, stop_asked())) return retreat();
-    document_.displacement = std::make_shared<const std::vector<Vec3>>(model_->whole_displacement());
-  }
+  rest();
   const bool rests = !on_its_way();
   const std::lock_guard lock(mutex_);
   settle(rests && queue_.empty());
+}
+
+// What is done to the part next, and what undo leads back to, begins with it in equilibrium.
+void ClaySession::rest() {
+  if (!model_ || model_->residual() <= kRest) return;
+  if (!model_->lead(model_->poses(), kRest, kIterations, stop_asked())) return retreat();
+  document_.displacement = std::make_shared<const std::vector<Vec3>>(model_->whole_displacement());
 }
 
 // Whether the tool is not where it should be yet.

@@ -71,6 +71,7 @@ class ClaySession {
   [[nodiscard]] bool on_its_way() const;
   [[nodiscard]] bool hand_moves() const { return Clock::now() < quiet_; }
   [[nodiscard]] bool led_to(const ToolPose& pose);
+  void rest();
   void retreat();
   [[nodiscard]] std::vector<ToolPose> poses_with(const ToolPose& last) const;
   void learn_stiffness(const ToolPose& before, const Vec3& force);

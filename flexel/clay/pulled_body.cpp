@@ -179,10 +179,13 @@ bool PulledBody::solve(const std::vector<ToolPose>& poses, double tolerance, int
     lead_ties(poses_);
     return false;
   }
-  accept(std::move(trial), poses, outcome.relative_residual);
+  // Where nothing acts rounding is all that is out of balance, and all that there is to measure it by.
+  accept(std::move(trial), poses, std::min(outcome.relative_residual, tolerance));
   measure(mechanics_->forces(state_).total);
+  if (tolerance > kRest) return true;
   rested_ = state_.displacement;
   rested_poses_ = poses_;
+  rested_residual_ = residual_;
   return true;
 }
 
@@ -250,6 +253,7 @@ void PulledBody::accept(simulate::State state, const std::vector<ToolPose>& pose
 void PulledBody::retreat() {
   state_.displacement = rested_;
   poses_ = rested_poses_;
+  residual_ = rested_residual_;
   memory_ = {};
   lead_ties(poses_);
   measure(mechanics_->forces(state_).total);

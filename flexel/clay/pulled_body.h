@@ -33,6 +33,8 @@ void refuse_unled(const simulate::Scene& scene, const Body& body, std::size_t pu
 [[nodiscard]] std::string led_through(const Body& body, const simulate::Scene& scene,
                                       const std::vector<Vec3>& now);
 
+inline constexpr double kRest = 1e-8;  // the residual of a part at rest
+
 struct LedTool {
   Vec3 middle = Vec3::Zero();  // m, rest: it turns about this
   bool pushes = false;         // an [[indenter]], else a [[move]]
@@ -58,7 +60,7 @@ class PulledBody {
   // Moves near the equilibrium with tools at `poses`: to a residual of `tolerance`, with the tangent that is there while it serves,
   // at a fraction of what lead() costs. False, and nothing has changed, where that is not enough, or a tool pushes.
   bool follow(const std::vector<ToolPose>& poses, double tolerance);
-  // Back to where lead() found an equilibrium last, or where it began.
+  // Back to where lead() found an equilibrium to kRest last, or where it began.
   void retreat();
 
   struct Felt {
@@ -102,9 +104,9 @@ class PulledBody {
   std::vector<ToolPose> poses_;
   std::vector<Felt> felt_;
   Answers answers_;
-  std::vector<Vec3> rested_;             // (elements) m, at the last equilibrium
-  std::vector<ToolPose> rested_poses_;   // (tools) likewise
-  double residual_ = 0, strongest_ = 0;  // 1; N, of a tool so far
+  std::vector<Vec3> rested_;                                   // (elements) m, at the last equilibrium
+  std::vector<ToolPose> rested_poses_;                         // (tools) likewise
+  double residual_ = 0, rested_residual_ = 0, strongest_ = 0;  // 1; 1; N, of a tool so far
 };
 
 }  // namespace flexel::clay

@@ -120,9 +120,11 @@ TEST(PulledBody, RetreatsToTheLastEquilibrium) {
   const Vec3 force = part.felt()[0].force;
   ASSERT_TRUE(part.follow(pose(3), 1e-2));
   EXPECT_GT(farthest(part.displacement(), rested), 1e-4);
+  ASSERT_TRUE(part.lead(pose(4), 1e-4, 12, kGoOn)) << "which is none to 1e-8";
   part.retreat();
   EXPECT_EQ(part.displacement(), rested);
   EXPECT_EQ(part.poses(), pose(2));
+  EXPECT_LE(part.residual(), kRest);
   EXPECT_EQ(part.felt()[0].force, force);
   EXPECT_TRUE(part.lead(pose(3), 1e-8, 40, kGoOn)) << "and goes on from there";
 }

@@ -156,6 +156,7 @@ def test_the_scene_does_the_same_without_hands():
         first = saved(url, "part.stl")
         frame = hand.act("keep")
         expect(frame["kept"] == 1 and frame["tools"] == [] and not frame["said"], f"{frame['kept']} {frame['tools']} {frame['said']}")
+        expect(frame["settled"] and frame["residual"] <= 1e-8, f"nothing acts, and all is in balance: {frame['residual']}")
         expect(farthest(saved(url, "part.stl"), first) < 1e-3, "what is kept is the shape that was seen")
         hand.act("grab face bracket/2")
         base = hand.last["place"][-1]
@@ -196,6 +197,29 @@ def test_while_the_hand_moves_the_part_follows_and_at_rest_it_is_exact():
         expect(apart < 2e-8 and many["place"] == once["place"], f"the same: {apart}")  # single precision of 80 mm
         expect(max(abs(a - b) for a, b in zip(many["felt"][-1], once["felt"][-1])) < 1e-5 * max(map(abs, once["felt"][-1])), f"{many['felt']} {once['felt']}")
         hand.leave()
+
+
+def test_what_is_done_while_the_hand_moves_is_done_to_the_part_at_rest():
+    bracket()
+    with clay("bracket.step", "--size", "5 mm") as (url, _):
+        hand = Hand(url, 16 * "a")
+        hand.settled()
+        hand.act("hold bracket/1", "grab face bracket/2")
+        places = []
+        for rests in (False, True):
+            for step in range(1, 21):
+                line, end = json.loads(hand.post(f"0 0 {2e-3 * math.sin(0.3 * step)} {-2e-4 * step}")[1])["line"], time.monotonic() + 30
+                while hand.last["line"] < line:
+                    expect(time.monotonic() < end and not hand.last["said"], f"it follows: {hand.last['said']}")
+                    time.sleep(0.001)
+            if rests:
+                hand.settled(line)
+            frame = hand.act("grab at 0.04 0.02 0.003 0.006")
+            expect(not frame["said"] and frame["grabs"] == len(places) + 2, f"{frame['said']}")
+            places.append(frame["place"][-1])
+            hand.act("undo", "undo")
+        apart = max(abs(a - b) for a, b in zip(*places))
+        expect(apart < 1e-10, f"the new tool begins in the same place: {apart}")
 
 
 def test_undo_and_redo_lead_back_and_forth():
@@ -456,7 +480,7 @@ def test_what_cannot_be_is_said_and_harms_nothing():
             expect(said in frame["said"], f"{lines}: {frame['said']!r}")
         hand.act("grab face bracket/2")
         frame = hand.act("0 -0.2 0 0")  # through the wall that holds it
-        expect("does not follow" in frame["said"], f"{frame['said']!r}")
+        expect("does not follow" in frame["said"] and frame["residual"] <= 1e-8, f"it rests where it followed to: {frame['said']!r} {frame['residual']}")
         bad = ["", "hold x", "client 1", "client 0123456789abcdeF\n", "client 0123456789abcdef\nfly", "client 0123456789abcdef\nhand nan 0 0",
                "client 0123456789abcdef\nhand 1e9 0 0", "client 0123456789abcdef\ngrab at 0 0 0 -1",
                "client 0123456789abcdef\ncarve at 0 0 0", "client 0123456789abcdef\ncarve at 0 0 0 0", "client 0123456789abcdef\nglue at 0 0 0 1", "client 0123456789abcdef\npaint steel", "client 0123456789abcdef\npaint  bracket",
