@@ -226,7 +226,7 @@ std::string strength(const SimulateResult& result, const Body& body, const std::
                        peak_stress(result, result.stress->value), place_in_one_unit(result.stress->at),
                        unsure(result));
   if (!(found->share > 0)) return "nothing is stressed";
-  if (found->share <= 1 && result.stress->lacks_bending())
+  if (found->nearest_share() <= 1 && result.stress->lacks_bending())
     return fmt::format(
         "not known: walls under two cells thick do not show the stress of their bending ({} without it)",
         human_pressure(found->stress));

@@ -311,7 +311,7 @@ Json strength_json(const SimulateResult& result, const Body& body, const std::ve
   Json json = Json::object();
   std::vector<std::string> unknown;
   const std::optional<StrengthSummary> found = nearest_to_strength(body, materials, unknown);
-  if (found && found->share <= 1 && result.stress->lacks_bending()) {
+  if (found && found->nearest_share() <= 1 && result.stress->lacks_bending()) {
     json["none"] = "walls under two cells thick do not show the stress of their bending";
   } else if (found) {
     json["share"] = found->share;

@@ -74,9 +74,7 @@ void judge(const QuadraticSystem& system, const QuadraticSolution& solution, Sim
   else if (!*solution.stable)
     progress.warn(
         "this equilibrium is not stable: the part buckles under less than this load, somewhere at least, and "
-        "what is told is as if it did not; model \"cells\" follows buckling by loads, and with a small load "
-        "to the "
-        "side that by heat");
+        "what is told is as if it did not; model \"cells\" with a small load to the side shows where");
 }
 
 ProbeResult measure_probe(const Probe& probe, const ProbePoints& placed, const QuadraticSystem& system,

@@ -25,12 +25,11 @@ std::pair<double, bool> limit_of(const Material& material) {
   return {breaks ? material.strength : material.yield, !breaks};
 }
 
-// Along the layers or across them.
-double nearest_share(const StrengthSummary& of) {
-  return std::max(of.share, of.layer_share.value_or(0));
-}
-
 }  // namespace
+
+double StrengthSummary::nearest_share() const {
+  return std::max(share, layer_share.value_or(0));
+}
 
 bool has_edited_limits(const Body& body, const Part& part) {
   for (const char* name : {"stiffness_change", "yield_change", "strength_change"}) {
@@ -68,7 +67,7 @@ std::optional<StrengthSummary> nearest_to_strength(const Body& body, const std::
     StrengthSummary here{stress[most] / limit, stress[most], body.rest[most], limit, yields, part.name,
                          material.name};
     if (material.layer_strength > 0) here.layer_share = stress[most] / material.layer_strength;
-    if (!found || nearest_share(here) > nearest_share(*found)) found = here;
+    if (!found || here.nearest_share() > found->nearest_share()) found = here;
   }
   return found;
 }

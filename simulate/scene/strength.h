@@ -19,6 +19,8 @@ struct StrengthSummary {   // of the part that is nearest to what its material b
   bool yields = false;     // there; else it breaks
   std::string part, material;
   std::optional<double> layer_share = {};  // of the strength of a print across its layers
+
+  [[nodiscard]] double nearest_share() const;  // along the layers or across them
 };
 
 // Whether an edit changed what cells of the part bear, by "stiffness", "yield" or "strength"

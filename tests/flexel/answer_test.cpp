@@ -154,6 +154,8 @@ TEST(Answer, HowNearToFailing) {
   EXPECT_THAT(made.text(), HasSubstr("safety factor 2 (1 across printed layers)"));
   made.result.stress->thin_walls = 0.9;
   EXPECT_THAT(made.text(), HasSubstr("strength   not known: walls under two cells thick"));
+  made.materials[0].layer_strength = 400e6;  // bending would add to what is too much without it
+  EXPECT_THAT(made.text(), HasSubstr("TOO WEAK across its layers"));
   made.result.stress->value = made.body.element_columns["von_mises"].values[0] = 4700e6;
   EXPECT_THAT(made.text(), HasSubstr("TOO WEAK"));
   made.result.stress.reset();  // model `paper`
