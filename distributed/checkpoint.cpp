@@ -29,8 +29,8 @@ struct Values {
 
 template <class Archive>
 void visit_values(Archive& archive, Values& values) {
-  visit_all(archive, values.scene, values.body, values.done.share, values.done.reach,
-            values.done.displacement);
+  visit_all(archive, values.scene, values.body, values.done.share, values.done.reach, values.done.residual,
+            values.done.buckled, values.done.displacement);
 }
 
 }  // namespace

@@ -1,7 +1,8 @@
 // The last load step that ended in equilibrium, in a file, so that a job that was killed goes on from there.
 //
 // The file: eight bytes "flexelLS", the version and a content hash [u64, little endian] of what follows: the fingerprints of scene
-// and body, the share of the load, the reach of the first linear answer [m], the displacements [m], lists after their length.
+// and body, the share of the load, the reach of the first linear answer [m], the relative residual, whether the part has buckled (a byte), the
+// displacements [m], lists after their length.
 #pragma once
 #include <optional>
 #include <string>

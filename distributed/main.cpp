@@ -105,6 +105,13 @@ std::vector<std::string> names_of_results(const Arguments& arguments,
   return names;
 }
 
+// Pieces may go by another name than their list.
+void check_pieces(const Arguments& arguments, const PieceFiles& pieces) {
+  std::vector<OutputName> outputs = {{arguments.options.checkpoint}, {arguments.options.failed_output}};
+  for (const std::string& name : names_of_results(arguments, pieces)) outputs.push_back({name});
+  check_outputs(outputs, files_of(pieces), arguments.force);
+}
+
 LoadStepHooks hooks_of(const Arguments& arguments, const Scene& scene, const Body& body,
                        distributed::Leader& leader) {
   LoadStepHooks hooks;
@@ -139,6 +146,7 @@ void lead(Arguments& arguments, distributed::Leader& leader) {
   distributed::refuse_unsupported(scene);
   std::optional<PieceFiles> pieces;
   if (distributed::is_piece_list(arguments.body)) pieces = read_piece_list(arguments.body);
+  if (pieces) check_pieces(arguments, *pieces);
   Body body = pieces ? join_pieces(*pieces) : read_body(arguments.body);
   erase_stress_columns(body);
   distributed::refuse_unsupported(scene, body);

@@ -98,15 +98,9 @@ NewtonSnes::NewtonSnes(PieceSystem& system) : system_(system) {
                        &work_.trial, &work_.before})
     *each = system.vector();
   ok(SNESCreate(PETSC_COMM_WORLD, snes_.fill()));
-  ok(SNESSetType(snes_, SNESNEWTONLS));
   Vector residual_vector = system.vector();
   ok(SNESSetFunction(snes_, residual_vector, Calls::function, this));
   ok(SNESSetJacobian(snes_, system.matrix(), system.matrix(), Calls::jacobian, this));
-  ok(SNESSetConvergenceTest(snes_, Calls::judge, this, nullptr));
-  SNESLineSearch search;
-  ok(SNESGetLineSearch(snes_, &search));
-  ok(SNESLineSearchSetType(search, SNESLINESEARCHSHELL));
-  ok(SNESLineSearchShellSetUserFunc(search, Calls::line_search, this));
   KSP solver;
   ok(SNESGetKSP(snes_, &solver));
   ok(KSPSetType(solver, KSPCG));
@@ -123,6 +117,17 @@ NewtonSnes::NewtonSnes(PieceSystem& system) : system_(system) {
     throw InputError(std::string("--petsc: ") + error.what());
   }
   ok(KSPSetConvergenceTest(solver, Calls::judge_linear, this, nullptr));
+  steps_are_ours();
+}
+
+// After the options, of which some would take a step, or an end, that nothing here judges.
+void NewtonSnes::steps_are_ours() {
+  ok(SNESSetType(snes_, SNESNEWTONLS));
+  ok(SNESSetConvergenceTest(snes_, Calls::judge, this, nullptr));
+  SNESLineSearch search;
+  ok(SNESGetLineSearch(snes_, &search));
+  ok(SNESLineSearchSetType(search, SNESLINESEARCHSHELL));
+  ok(SNESLineSearchShellSetUserFunc(search, Calls::line_search, this));
 }
 
 bool NewtonSnes::agree_to_stop() {

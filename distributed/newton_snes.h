@@ -25,6 +25,7 @@ class NewtonSnes {
   struct Calls;  // what PETSc calls back
 
   [[nodiscard]] bool full() const { return options_.steps == simulate::NewtonSteps::full; }
+  void steps_are_ours();
   void begin(Vec displacement, Vec prescribed);
   void residual(Vec displacement, Vec negative);
   void linearise(Vec displacement);

@@ -2,7 +2,7 @@
 #include "distributed/result_in_pieces.h"
 
 #include <algorithm>
-#include <bit>
+#include <span>
 #include <stdexcept>
 #include <tuple>
 
@@ -63,11 +63,18 @@ Columns taken(const Columns& whole, const Places& places) {
   return result;
 }
 
-std::uint64_t hash_of(const std::vector<Vec3>& positions) {
-  std::vector<std::uint64_t> bits;
-  for (const Vec3& position : positions)
-    for (const double x : position) bits.push_back(std::bit_cast<std::uint64_t>(x));
-  return run_number(bits);
+// Of all that the pieces of two results may differ in: one may move like another and bear other stresses.
+std::uint64_t hash_of(const Body& result) {
+  const std::span<const Vec3> positions = result.position;
+  std::vector<std::uint64_t> made_from = {content_hash(std::as_bytes(positions))};
+  for (const Columns* columns : {&result.element_columns, &result.cell_columns})
+    for (const auto& [name, column] : *columns) {
+      made_from.push_back(content_hash(std::as_bytes(std::span(name))));
+      made_from.push_back(content_hash(std::as_bytes(std::span(column.values))));
+    }
+  for (const Part& part : result.parts)
+    made_from.push_back(content_hash(std::as_bytes(std::span(part.material))));
+  return run_number(made_from);
 }
 
 }  // namespace
@@ -77,7 +84,7 @@ bool is_piece_list(const std::string& path) {
 }
 
 void write_in_pieces(Body& result, const PieceFiles& files, const std::string& list, bool compress) {
-  const std::array<std::uint64_t, 2> made_from = {files.run, hash_of(result.position)};
+  const std::array<std::uint64_t, 2> made_from = {files.run, hash_of(result)};
   const std::uint64_t run = run_number(made_from);
   const SurfaceBeside surface = write_shared_surface(result, list, compress);
   std::vector<vtu::HeadArray> arrays;
@@ -91,7 +98,9 @@ void write_in_pieces(Body& result, const PieceFiles& files, const std::string& l
     piece.body.cell_columns = taken(result.cell_columns, cells);
     for (std::size_t part = 0; part < result.parts.size(); ++part)
       piece.body.parts[part].material = result.parts[part].material;
+    const std::string which = piece.body.notes["piece"];
     piece.body.notes = result.notes;
+    piece.body.notes["piece"] = which;
     piece.numbers.run = run;
     arrays = write_piece(piece, list, surface, compress);
   }

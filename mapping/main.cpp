@@ -16,6 +16,7 @@
 #include "formats/exchange/import.h"
 #include "formats/exchange/surface_file.h"
 #include "formats/lattice/body_file.h"
+#include "formats/pieces/pieces.h"
 #include "mapping/anchors/other_surfaces.h"
 #include "mapping/binding_file.h"
 #include "mapping/cad_output.h"
@@ -167,7 +168,10 @@ void plan_refinement(const Arguments& arguments, const CommandLine& app, Plan& p
 }
 
 std::vector<std::string> inputs_of(const Arguments& arguments) {
-  return {arguments.body, arguments.onto, arguments.points, arguments.binding};
+  std::vector<std::string> inputs = {arguments.body, arguments.onto, arguments.points, arguments.binding};
+  if (names_pieces(arguments.body))
+    for (const std::string& file : files_of(read_piece_list(arguments.body))) inputs.push_back(file);
+  return inputs;
 }
 
 Plan make_plan(Arguments& arguments, const CommandLine& app) {

@@ -122,6 +122,17 @@ PieceFiles read_piece_list(const std::string& path) {
   return files;
 }
 
+std::vector<std::string> files_of(const PieceFiles& files) {
+  std::vector<std::string> all = files.files;
+  all.push_back(files.list);
+  all.push_back(shared_surface_path(files.list));
+  // A list that was renamed: the surface has the name of its pieces.
+  const std::string& first = files.files.front();
+  if (constexpr std::string_view end = "_0.vtu"; first.ends_with(end))
+    all.push_back(shared_surface_path(first.substr(0, first.size() - end.size()) + ".pvtu"));
+  return all;
+}
+
 PieceBody read_piece(const PieceFiles& files, std::uint32_t index) {
   const std::string& path = files.files.at(index);
   refuse_device(path, files.list);

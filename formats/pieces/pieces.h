@@ -61,6 +61,9 @@ struct PieceFiles {
 std::vector<vtu::HeadArray> write_piece(const PieceBody& piece, const std::string& list,
                                         const SurfaceBeside& surface, bool compress = false);
 
+// Every file of the run: list, pieces, surface.
+[[nodiscard]] std::vector<std::string> files_of(const PieceFiles& files);
+
 // Writes the list of `count` pieces of a run, whose arrays are those of one of them.
 void write_piece_list(const std::string& path, std::uint64_t run, std::uint32_t count,
                       const std::vector<vtu::HeadArray>& arrays);

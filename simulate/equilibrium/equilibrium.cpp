@@ -132,6 +132,12 @@ class LoadStepping {
     if (!hooks || !hooks->begin) return;
     done_ = hooks->begin->share;
     reach_.first = hooks->begin->reach;
+    result_.relative_residual = hooks->begin->residual;
+    result_.buckled = hooks->begin->buckled;
+    if (result_.buckled)
+      progress_.warn(
+          "the part buckled before the load step that this run goes on from; beyond it, one of several "
+          "shapes that it may take");
     state_.displacement = hooks->begin->displacement;
     state_.share = done_;
   }
@@ -273,7 +279,8 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   for (const ActiveEffect& effect : mechanics_.effects()) effect->accept(state_);
   ++result_.load_steps;
   result_.relative_residual = outcome_.relative_residual;
-  if (hooks_ && hooks_->done) hooks_->done({done_, reach_.first, state_.displacement});
+  if (hooks_ && hooks_->done)
+    hooks_->done({done_, reach_.first, outcome_.relative_residual, result_.buckled, state_.displacement});
   length_.succeeded(outcome_.iterations <= kEasyIterations);
   return true;
 }

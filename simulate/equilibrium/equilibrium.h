@@ -58,6 +58,8 @@ using LoadStepSolver = std::function<NewtonOutcome(State&, const NewtonOptions&,
 struct LoadStepDone {
   double share = 0;                // of the load
   double reach = 0;                // m, of the first linear answer, for the whole load
+  double residual = 0;             // relative, as NewtonOutcome has it
+  bool buckled = false;            // as EquilibriumResult has it
   std::vector<Vec3> displacement;  // m (elements)
 };
 

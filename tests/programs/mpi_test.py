@@ -83,12 +83,12 @@ def close(one, other, share, what):
     expect(numpy.abs(one - other).max() <= share * scale, f"{what}: off by {numpy.abs(one - other).max() / scale:.1e}, allowed {share:.0e}")
 
 
-def same_answer(ranks, text, *options):
+def same_answer(ranks, text, *options, petsc=""):
     need_mpi()
     scene(text=text)
     body()
     expect_ok(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "one.vtu", "--summary", "one.json", "--threads", "1", *options))
-    expect_ok(mpi(ranks, "scene.toml", "body.vtu", "-o", "all.vtu", "--summary", "all.json", *options))
+    expect_ok(mpi(ranks, "scene.toml", "body.vtu", "-o", "all.vtu", "--summary", "all.json", *options, *(("--petsc", petsc) if petsc else ())))
     one, every = points("one.vtu"), points("all.vtu")
     close(every.point_data["displacement"], one.point_data["displacement"], 1e-8, "displacements")
     for column in ("von_mises", "principal_stresses"):
@@ -149,6 +149,10 @@ def test_pieces_in_and_out():
     expect_ok(run("flexel-map", "bent.vtu", "-o", "whole.stl"))
     expect(pathlib.Path("pieces.stl").read_bytes() == pathlib.Path("whole.stl").read_bytes(), "mapped from pieces and from the whole")
     expect_error(mpi(2, "scene.toml", "parts.pvtu", "-o", "bent.vtu"), PROGRAM, "come out as pieces")
+    expect(b"1 of 3" in pathlib.Path("bent_1.vtu").read_bytes(), "the note which piece it is")
+    os.replace("parts.pvtu", "list.pvtu")
+    expect_error(mpi(2, "scene.toml", "list.pvtu", "-o", "parts.pvtu"), PROGRAM, "parts_", "is an input")
+    os.replace("list.pvtu", "parts.pvtu")
     os.replace("bent_1.vtu", "parts_1.vtu")
     expect_error(mpi(2, "scene.toml", "parts.pvtu", "-o", "again.pvtu"), PROGRAM, "piece 1", "another run")
 
@@ -161,6 +165,10 @@ def test_options_of_petsc():
     expect("type: jacobi" in result.out.decode() and "type: cg" in result.out.decode(), f"-ksp_view should show the solver: {result}")
     expect("nothing asked for -no_such" in result.err and "-ksp_view" not in result.err.split("nothing asked for")[1],
            f"unused options should be named: {result}")
+
+
+def test_no_option_of_petsc_ends_newtons_method_early():
+    same_answer(2, LARGE, "--no-estimate", petsc="-snes_type ksponly -snes_linesearch_type basic -snes_convergence_test skip")
 
 
 def test_what_ranks_do_not_do_is_refused():
@@ -235,6 +243,9 @@ def test_a_killed_rank_loses_one_load_step_at_most():
     whole, resumed = json.loads(pathlib.Path("whole.json").read_text()), json.loads(pathlib.Path("resumed.json").read_text())
     expect(resumed["load_steps"] < whole["load_steps"], f"{resumed['load_steps']} load steps after {whole['load_steps']}: nothing was kept")
     close(points("out.vtu").point_data["displacement"], points("whole.vtu").point_data["displacement"], 1e-8, "displacements")
+    expect_ok(mpi(2, *command, "--resume", "steps", "--summary", "ended.json"))
+    ended = json.loads(pathlib.Path("ended.json").read_text())
+    expect(ended["load_steps"] == 0 and ended["relative_residual"] == resumed["relative_residual"] > 0, f"nothing was left to do: {ended}")
     scene(text=LARGE + "load_steps = 41\n")
     expect_error(mpi(2, *command, "--resume", "steps"), PROGRAM, "another scene")
     data = pathlib.Path("steps").read_bytes()

@@ -156,5 +156,13 @@ def test_pieces_need_a_list_and_a_number():
     expect_only("box.stl")
 
 
+def test_what_is_mapped_replaces_no_file_of_the_run():
+    pieces(2, "box.stl", "--size", "2 mm")
+    for name in ("body_1.vtu", "body_surface.vtu"):
+        expect_error(run("flexel-map", "body.pvtu", "-o", name), "flexel-map", name, "is an input")
+    os.replace("body.pvtu", "list.pvtu")
+    expect_error(run("flexel-map", "list.pvtu", "-o", "out.stl", "--report", "body_surface.vtu"), "flexel-map", "body_surface.vtu", "is an input")
+
+
 if __name__ == "__main__":
     main(globals())
