@@ -128,11 +128,13 @@ void refuse_kernel(const SimulateOptions& options, const std::string& scene) {
 
 class Run {
  public:
-  Run(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress)
+  // `judged`: asks whether the equilibrium is stable, which takes a linear solution.
+  Run(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress, bool judged)
       : body_(body),
         scene_(scene),
         options_(options),
         progress_(progress),
+        judged_(judged),
         fragments_(find_fragments(body)),
         problem_(equilibrium_problem(body_, scene, fragments_, unsupported_)) {
     constexpr double kPosed = 0.2;
@@ -155,6 +157,7 @@ class Run {
   const Scene& scene_;
   const SimulateOptions& options_;
   Progress& progress_;
+  bool judged_;
   Fragments fragments_;
   std::size_t unsupported_ = 0;  // elements at tips and edges that springs do not hold
   Problem problem_;
@@ -199,7 +202,7 @@ std::optional<NearStart> Run::coarse_equilibrium(Progress& stretch) {
     options.stress = options.explain = false;
     options.failed_output.clear();
     options.hooks = hooks_on_coarser(options_.hooks);
-    Run run(coarse.body, same, options, stretch);
+    Run run(coarse.body, same, options, stretch, false);
     const SimulateResult found = run();
     start_newton_iterations_ = std::max(found.newton_iterations, found.start_newton_iterations);
     if (run.buckled_) return std::nullopt;  // the lattices may go to different sides
@@ -226,9 +229,10 @@ std::string Run::save_failed(const Mechanics& mechanics) {
   return "; the last state in equilibrium is in " + options_.failed_output;
 }
 
-// Loads that follow have no energy whose minimum is looked for. Load steps scale loads and moves; free
-// strain acts whole from the first on, so that buckling is not met on the way.
+// A load that is as symmetric as the part does not excite the shape that it buckles into, so no load step meets buckling.
+// Nor do free strain, which acts whole from the first one on, and loads that follow, which have no energy.
 void Run::warn_of_buckling(Mechanics& mechanics) {
+  const auto drives = [](const ActiveEffect& effect) { return effect->drives(); };
   bool linked = false, follows = mechanics.follows();
   for (const Motion& motion : mechanics.constraints().motions)
     if (motion.link) {
@@ -237,14 +241,20 @@ void Run::warn_of_buckling(Mechanics& mechanics) {
     }
   // The tangent knows rigid links only where they are held.
   if (follows) report_following(!linked && has_positive_tangent(mechanics, state_) == true, progress_);
-  if (!body_.cell_columns.contains(kFreeStrainColumn)) return;
+  const bool strained = body_.cell_columns.contains(kFreeStrainColumn);
+  const bool loaded = std::any_of(mechanics.effects().begin(), mechanics.effects().end(), drives);
+  if (!strained && (follows || !loaded || !judged_)) return;
   const std::optional<bool> stable = has_positive_tangent(mechanics, state_);
   if (stable == true) return;
+  const std::string less = strained ? "less heat or shrinkage than this" : "less than this load";
   progress_.warn(scene_.name + ": " +
                  (stable
-                      ? "this equilibrium is not stable: the part buckles under less heat or shrinkage than "
-                        "this, and what is told is as if it did not; a small load to the side shows where "
-                        "it goes"
+                      ? fmt::format("this equilibrium is not stable: the part buckles under {}, and what is "
+                                    "told is as if it did not; {}",
+                                    less,
+                                    strained ? "a small load to the side shows where it goes"
+                                             : "[run] buckling = 1 with model \"quadratic\" tells from which "
+                                               "load on")
                       : "whether this equilibrium is stable was not found out: the part may buckle"));
 }
 
@@ -344,12 +354,12 @@ void refuse_heat(const Scene& scene) {
 }
 
 // The runs at equilibrium without contact, by the model. `linear_reach` [m]: the largest displacement in proportion to
-// the load; 0: not known.
+// the load; 0: not known; null: of a coarser lattice, for whose answer nobody is warned.
 SimulateResult run_at_rest(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress,
                            double* linear_reach = nullptr) {
   if (is_quadratic(scene, body)) return run_quadratic(body, scene, options, progress, linear_reach);
   const FreeStrainInBody free(body, scene);
-  Run run(body, scene, options, progress);
+  Run run(body, scene, options, progress, linear_reach != nullptr);
   SimulateResult result = run();
   if (linear_reach != nullptr) *linear_reach = run.linear_reach();
   return result;

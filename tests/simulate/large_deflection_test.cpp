@@ -71,6 +71,23 @@ TEST(LargeDeflection, ColumnsCriticalLoad) {
   EXPECT_NEAR(critical / bar.euler(), 1, 0.03);
 }
 
+// A load along its axis alone leaves a column straight, beyond its critical load too: that is told.
+TEST(LargeDeflection, AStraightColumnThatWouldBuckleIsToldSo) {
+  const Slender bar{2, 15};
+  for (const char* model : {"cells", "springs", "paper"})
+    for (const double share : {0.7, 2.0}) {
+      Body body = column(bar);
+      Scene scene = held(Vec3(-share * bar.euler(), 0, 0));
+      scene.parts[body.parts[0].name].model = model;
+      ::testing::internal::CaptureStderr();
+      (void)find_equilibrium(body, scene);
+      const std::string said = ::testing::internal::GetCapturedStderr();
+      EXPECT_EQ(said.find("not stable: the part buckles under less than this load") != std::string::npos,
+                share > 1)
+          << model << share << said;
+    }
+}
+
 // Past it: the elastica of a column at P = 1.152 Pcr, whose end has turned by 60 degrees, gone 0.593 L aside
 // and come 0.259 L nearer (Timoshenko and Gere 1961, table 2-4). Led aside by that much it needs no force
 // aside.
