@@ -149,7 +149,7 @@ class Run {
   // So much of what goes before the search for the equilibrium is done.
   void prepared(double share) { progress_.update(share * kBeforeSearch, "preparing"); }
   EquilibriumResult solve(Mechanics& mechanics);
-  void warn_of_buckling(Mechanics& mechanics);
+  void warn_of_buckling(Mechanics& mechanics, Preconditioner* near);
   [[nodiscard]] std::optional<NearStart> coarse_equilibrium(Progress& stretch);
   [[nodiscard]] std::string save_failed(const Mechanics& mechanics);
 
@@ -231,7 +231,7 @@ std::string Run::save_failed(const Mechanics& mechanics) {
 
 // A load that is as symmetric as the part does not excite the shape that it buckles into, so no load step meets buckling.
 // Nor do free strain, which acts whole from the first one on, and loads that follow, which have no energy.
-void Run::warn_of_buckling(Mechanics& mechanics) {
+void Run::warn_of_buckling(Mechanics& mechanics, Preconditioner* near) {
   const auto drives = [](const ActiveEffect& effect) { return effect->drives(); };
   bool linked = false, follows = mechanics.follows();
   for (const Motion& motion : mechanics.constraints().motions)
@@ -244,7 +244,7 @@ void Run::warn_of_buckling(Mechanics& mechanics) {
   const bool strained = body_.cell_columns.contains(kFreeStrainColumn);
   const bool loaded = std::any_of(mechanics.effects().begin(), mechanics.effects().end(), drives);
   if (!strained && (follows || !loaded || !judged_)) return;
-  const std::optional<bool> stable = has_positive_tangent(mechanics, state_);
+  const std::optional<bool> stable = has_positive_tangent(mechanics, state_, strained ? nullptr : near);
   if (stable == true) return;
   const std::string less = strained ? "less heat or shrinkage than this" : "less than this load";
   progress_.warn(scene_.name + ": " +
@@ -285,10 +285,12 @@ SimulateResult Run::operator()() {
   state_.displacement = where_to_begin(body_);
   const bool from_rest = std::all_of(state_.displacement.begin(), state_.displacement.end(),
                                      [](const Vec3& u) { return u.isZero(0); });
-  const EquilibriumResult solved = solve(mechanics);
+  EquilibriumResult solved = solve(mechanics);
   // What touches stiffens or softens the first answer, which says nothing of buckling then.
   if (from_rest && !solved.buckled && !mechanics.unilateral()) linear_reach_ = solved.linear_reach;
   const StopWaits answered;  // what is found is told: the rest takes moments
+  warn_of_buckling(mechanics, solved.preconditioner.get());
+  solved.preconditioner.reset();
   buckled_ = solved.buckled;
   followers_ = follower_memory(mechanics);
   mechanics.report(state_, result);
@@ -300,7 +302,6 @@ SimulateResult Run::operator()() {
   measure_corners(mechanics.cells(), body_, state_, result, progress_);
   if (options_.stress) measure_stress(problem_, state_, body_, result);
   if (options_.estimate) mark_singular(body_, tied_, result);
-  warn_of_buckling(mechanics);
   carry_strays(fragments_, problem_, mechanics.stencil(), state_);
   move_body(body_, state_);
   if (scene_.run.renormalise) renormalise_all(body_, problem_, state_.displacement);

@@ -264,7 +264,10 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
     progress_.update(begun_ + (1 - begun_) * (done_ + most_gone * (trial_.share - done_)),
                      fmt::format("load {:.3g} %, {}", 100 * trial_.share, note));
   };
-  outcome_ = solver_ ? solver_(trial_, options, tell) : newton_with_links(mechanics_, trial_, options, tell);
+  NewtonMemory memory;
+  outcome_ = solver_ ? solver_(trial_, options, tell)
+                     : newton_with_links(mechanics_, trial_, options, tell, &memory);
+  result_.preconditioner = std::move(memory.preconditioner);
   if (reach_.first == 0)
     reach_.first = outcome_.first_reach / trial_.share;  // from rest: a near start moves by less
   result_.newton_iterations += outcome_.iterations;

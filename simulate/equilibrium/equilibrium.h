@@ -1,6 +1,7 @@
 // Equilibrium: Newton's method under load steps that cut themselves.
 #pragma once
 #include <functional>
+#include <memory>
 #include <optional>
 
 #include "base/program/progress.h"
@@ -21,6 +22,8 @@ struct EquilibriumResult {
   // m: the largest displacement in proportion to the whole load, as if free strain made no stresses; 0 where only free
   // strain moves the body, or it was not found
   double linear_reach = 0;
+  // Of Mechanics::tangent(), as the last load step left it; null where that had another solver.
+  std::shared_ptr<Preconditioner> preconditioner;
 };
 
 // What loads that follow the shape remember of the way to where they are: Effect::memory() of each, in their

@@ -1,6 +1,7 @@
 // A load that is as symmetric as the part never excites the shape that it buckles into; irregular forces do.
 #include "simulate/equilibrium/positive_tangent.h"
 
+#include <memory>
 #include <random>
 
 #include "base/stop.h"
@@ -10,7 +11,7 @@
 
 namespace flexel::simulate {
 
-std::optional<bool> has_positive_tangent(Mechanics& mechanics, const State& state) {
+std::optional<bool> has_positive_tangent(Mechanics& mechanics, const State& state, Preconditioner* near) {
   constexpr double kTolerance = 1e-6;
   constexpr int kIterations = 1000;
   // What was found is told under a StopWaits; this question may not keep that waiting.
@@ -27,13 +28,17 @@ std::optional<bool> has_positive_tangent(Mechanics& mechanics, const State& stat
       const double value = static_cast<double>(random()) / 4294967295.0 - 0.5;
       irregular[e][axis] = mechanics.constraints().mask[e] >> axis & 1 ? 0 : value;
     }
-  const auto preconditioner =
-      aggregation_multigrid(mechanics.tangent(), node_geometry(mechanics.body(), state));
+  std::unique_ptr<Preconditioner> made;
+  if (near != nullptr)
+    near->refresh_smoother();
+  else
+    made = aggregation_multigrid(mechanics.tangent(), node_geometry(mechanics.body(), state));
+  const Preconditioner& preconditioner = near != nullptr ? *near : *made;
   const FollowedTangent symmetric = mechanics.followed(true);
   const LinearOperator& tangent =
       mechanics.follows() ? static_cast<const LinearOperator&>(symmetric) : mechanics.tangent();
   const LinearResult result = conjugate_gradients(
-      tangent, irregular, answer, *preconditioner, kTolerance, kIterations, [](int, double) { check_stop(); },
+      tangent, irregular, answer, preconditioner, kTolerance, kIterations, [](int, double) { check_stop(); },
       [](int, double) { return stop_is_due(); });
   if (result.indefinite) return false;
   if (result.converged) return true;

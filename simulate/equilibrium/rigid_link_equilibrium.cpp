@@ -265,8 +265,9 @@ NewtonOutcome Balance::run() {
 }  // namespace
 
 NewtonOutcome newton_with_links(Mechanics& mechanics, State& state, const NewtonOptions& options,
-                                const NewtonProgress& progress) {
-  if (rigid_links(mechanics.constraints()).empty()) return newton(mechanics, state, options, progress);
+                                const NewtonProgress& progress, NewtonMemory* memory) {
+  if (rigid_links(mechanics.constraints()).empty())
+    return newton(mechanics, state, options, progress, memory);
   return Balance(mechanics, state, options, progress).run();
 }
 

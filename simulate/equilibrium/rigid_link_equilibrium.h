@@ -7,7 +7,9 @@ namespace flexel::simulate {
 // As newton(), with every rigid link where its force and its couple are in balance with what it pulls.
 // Without links it is newton(). On failure the links are where they were. Throws InputError, named for the
 // link, when nothing resists a motion of it.
+// `memory`: of newton(); where there are links it is left as it is.
 [[nodiscard]] NewtonOutcome newton_with_links(Mechanics& mechanics, State& state,
-                                              const NewtonOptions& options, const NewtonProgress& progress);
+                                              const NewtonOptions& options, const NewtonProgress& progress,
+                                              NewtonMemory* memory = nullptr);
 
 }  // namespace flexel::simulate
