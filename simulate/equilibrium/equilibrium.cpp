@@ -264,6 +264,7 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
     progress_.update(begun_ + (1 - begun_) * (done_ + most_gone * (trial_.share - done_)),
                      fmt::format("load {:.3g} %, {}", 100 * trial_.share, note));
   };
+  result_.preconditioner.reset();
   NewtonMemory memory;
   outcome_ = solver_ ? solver_(trial_, options, tell)
                      : newton_with_links(mechanics_, trial_, options, tell, &memory);

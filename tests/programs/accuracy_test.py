@@ -210,6 +210,11 @@ def test_a_column_about_to_buckle_is_told():
     write("across.toml", 'material = "PLA"\nmodel = "cells"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = ["0 N", "0 N", "1 N"]\n')
     result = expect_ok(run("flexel", "deform", "column.stl", "--scene", "across.toml", "--size", "1 mm", "-o", "bent.stl"))
     expect("buckle" not in result.err, result.err)
+    write("short.stl", binary_stl(box_triangles((120, 8, 4))))  # a load along its axis leaves it straight; it buckles at 512 N
+    for model, newtons in (("cells", 300), ("cells", 2000), ("springs", 2000), ("quadratic", 2000)):
+        result = expect_ok(run("flexel", "deform", "short.stl", "--fix", "xmin", "--push", f"xmax: -{newtons} 0 0 N", "--material", "aluminium",
+                               "--model", model, "--size", "2 mm", "--no-estimate", "-o", "bent.stl", "--force"))
+        expect(("not stable: the part buckles under less than this load" in result.err) == (newtons > 512), f"{model}, {newtons} N: {result.err}")
 
 
 def test_a_strip_bent_to_its_length_has_not_buckled():
