@@ -126,6 +126,7 @@ void Progress::stage(const std::string& name) {
   stage_ = name;
   stage_began_ = now();
   last_drawn_ = -1;
+  last_share_ = 0;
   update(0);
 }
 
@@ -136,10 +137,11 @@ void Progress::update(double share, const std::string& note) {
   }
   const bool listening = listener != nullptr;
   if ((mode_ != Mode::bar && !listening) || stage_.empty()) return;
-  const double time = now();
-  if (last_drawn_ >= 0 && time - last_drawn_ < kDrawInterval) return;
+  const double time = now(), done = std::isfinite(share) ? std::clamp(share, 0.0, 1.0) : 0.0;
+  const bool gets_going = last_share_ == 0 && done > 0;  // told however short the stage is
+  if (last_drawn_ >= 0 && !gets_going && time - last_drawn_ < kDrawInterval) return;
   last_drawn_ = time;
-  const double done = std::isfinite(share) ? std::clamp(share, 0.0, 1.0) : 0.0;
+  last_share_ = done;
   const std::optional<double> left = seconds_left(time - stage_began_, done);
   if (listening) return listener->update(stage_, done, note, left);
   const auto filled = static_cast<std::size_t>(std::lround(done * kBarWidth));

@@ -58,6 +58,7 @@ class Progress {
   std::string stage_;
   double stage_began_ = 0;
   double last_drawn_ = -1;
+  double last_share_ = 0;
 };
 
 }  // namespace flexel

@@ -247,7 +247,9 @@ export class Picture {
 
   // Where a place of a panel (m, about its centre) is, in CSS pixels.
   project(panel, place) {
-    const {x, y, width, height} = this.layout[this.panels.indexOf(panel)], at = place.clone().project(panel.camera);
+    const {x, y, width, height} = this.layout[this.panels.indexOf(panel)];
+    this.view.apply(panel.camera, this.radiusOf(panel), width / height);
+    const at = place.clone().project(panel.camera);
     return [x + (at.x + 1) / 2 * width, y + (1 - at.y) / 2 * height];
   }
 
