@@ -7,6 +7,9 @@
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
 
+#include <system_error>
+#include <thread>
+
 namespace flexel {
 
 class ThreadLimit::Control {
@@ -21,7 +24,20 @@ ThreadLimit::ThreadLimit(int threads)
     : control_(std::make_unique<Control>(
           static_cast<std::size_t>(threads > 0 ? threads : tbb::info::default_concurrency()))) {}
 
-ThreadLimit::~ThreadLimit() = default;
+// Lifting a limit starts the threads that waiting work asks for, and where none can be started that ends the program from
+// within TBB. There the limit stays.
+ThreadLimit::~ThreadLimit() {
+  if (!can_start_a_thread()) (void)control_.release();
+}
+
+bool can_start_a_thread() {
+  try {
+    std::thread([] {}).join();
+    return true;
+  } catch (const std::system_error&) {
+    return false;
+  }
+}
 
 int default_thread_count() {
   return tbb::info::default_concurrency();

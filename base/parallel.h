@@ -26,6 +26,9 @@ class ThreadLimit {
   std::unique_ptr<Control> control_;
 };
 
+// By trying; the limits of the shell may leave no room.
+[[nodiscard]] bool can_start_a_thread();
+
 [[nodiscard]] int default_thread_count();
 
 // Threads that the functions below use now, at least 1.

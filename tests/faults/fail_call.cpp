@@ -3,6 +3,7 @@
 // of each kind there were is appended at the end. Writes to stderr do not count, for messages have to come out.
 #include <dlfcn.h>
 #include <fcntl.h>
+#include <pthread.h>
 #include <sys/types.h>
 #include <unistd.h>
 
@@ -17,9 +18,9 @@ extern "C" void* __libc_malloc(std::size_t size);
 
 namespace {
 
-enum Kind { kWrite, kFsync, kRename, kOpen, kClose, kMalloc, kKinds };
-constexpr const char* kNames[kKinds] = {"write", "fsync", "rename", "open", "close", "malloc"};
-constexpr int kErrors[kKinds] = {ENOSPC, EIO, EIO, ENOSPC, EIO, ENOMEM};
+enum Kind { kWrite, kFsync, kRename, kOpen, kClose, kMalloc, kThread, kKinds };
+constexpr const char* kNames[kKinds] = {"write", "fsync", "rename", "open", "close", "malloc", "thread"};
+constexpr int kErrors[kKinds] = {ENOSPC, EIO, EIO, ENOSPC, EIO, ENOMEM, EAGAIN};
 
 std::atomic<long> counts[kKinds];
 std::atomic<bool> ready{false};
@@ -124,6 +125,12 @@ int close(int descriptor) {
   static const auto next = real<int(int)>("close");
   const int done = next(descriptor);  // a close() that fails has closed
   return fails(kClose) ? -1 : done;
+}
+
+int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*start)(void*), void* given) {
+  static const auto next =
+      real<int(pthread_t*, const pthread_attr_t*, void* (*)(void*), void*)>("pthread_create");
+  return fails(kThread) ? kErrors[kThread] : next(thread, attributes, start, given);
 }
 
 void* malloc(std::size_t size) {

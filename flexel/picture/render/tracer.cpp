@@ -7,10 +7,9 @@
 #include <algorithm>
 #include <new>
 #include <stdexcept>
-#include <system_error>
-#include <thread>
 
 #include "base/error.h"
+#include "base/parallel.h"
 #include "base/program/share_scope.h"
 
 namespace flexel::picture {
@@ -39,12 +38,9 @@ void set_ray(RTCRay16& packet, std::size_t i, const Ray& ray) {
 
 [[noreturn]] void fail(RTCDevice device) {
   if (rtcGetDeviceError(device) == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
-  try {
-    std::thread([] {}).join();
-  } catch (const std::system_error&) {  // Embree does not tell this from other errors
+  if (!can_start_a_thread())  // Embree does not tell this from other errors
     throw InputError(
         "no thread can be started, and a picture needs some: raise the limits of this shell (ulimit -u)");
-  }
   throw std::runtime_error("Embree could not build its tree");
 }
 
