@@ -241,6 +241,13 @@ std::string strength(const SimulateResult& result, const Body& body, const std::
                   human_pressure(found->limit), found->material, found->yields ? "yields" : "breaks",
                   place_in_one_unit(found->stress == result.stress->value ? result.stress->at : found->at),
                   unsure(result));
+  std::vector<std::string> others;
+  for (const std::string& part : found->too_weak)
+    if (part != found->part) others.push_back(fmt::format("\"{}\"", part));
+  if (!others.empty())
+    text += fmt::format("; TOO WEAK too: {}{}",
+                        fmt::join(others.begin(), others.begin() + std::min(kNamed, others.size()), ", "),
+                        more(others.size()));
   if (!unknown.empty()) text += fmt::format("; unknown of {}", fmt::join(unknown, ", "));
   return text;
 }

@@ -322,6 +322,7 @@ Json strength_json(const SimulateResult& result, const Body& body, const std::ve
     json["part"] = found->part;
     json["material"] = found->material;
     if (found->layer_share) json["layer_share"] = *found->layer_share;
+    json["too_weak"] = found->too_weak;
   }
   json["unknown"] = unknown;
   return json;

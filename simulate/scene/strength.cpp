@@ -48,6 +48,7 @@ std::optional<StrengthSummary> nearest_to_strength(const Body& body, const std::
   if (column == body.element_columns.end()) return std::nullopt;
   const auto& stress = column->second.values;
   std::optional<StrengthSummary> found;
+  std::vector<std::string> too_weak;
   for (std::size_t p = 0; p < body.parts.size(); ++p) {
     const Part& part = body.parts[p];
     const Material& material = materials[p];
@@ -67,8 +68,10 @@ std::optional<StrengthSummary> nearest_to_strength(const Body& body, const std::
     StrengthSummary here{stress[most] / limit, stress[most], body.rest[most], limit, yields, part.name,
                          material.name};
     if (material.layer_strength > 0) here.layer_share = stress[most] / material.layer_strength;
+    if (here.nearest_share() > 1) too_weak.push_back(part.name);
     if (!found || here.nearest_share() > found->nearest_share()) found = here;
   }
+  if (found) found->too_weak = too_weak;
   return found;
 }
 

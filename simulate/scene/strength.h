@@ -19,6 +19,7 @@ struct StrengthSummary {   // of the part that is nearest to what its material b
   bool yields = false;     // there; else it breaks
   std::string part, material;
   std::optional<double> layer_share = {};  // of the strength of a print across its layers
+  std::vector<std::string> too_weak = {};  // parts whose nearest_share() is above 1
 
   [[nodiscard]] double nearest_share() const;  // along the layers or across them
 };

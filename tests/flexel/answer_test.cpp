@@ -187,6 +187,12 @@ TEST(Answer, TheSummaryHasTheWeakestPart) {
   EXPECT_EQ(found["material"], "PLA");
   EXPECT_EQ(found["at"][0], 0.01);
   EXPECT_TRUE(found["unknown"].empty());
+  EXPECT_EQ(found["too_weak"], nlohmann::ordered_json({"knob"}));
+  EXPECT_THAT(two.text(), Not(HasSubstr("TOO WEAK too")));
+  two.materials[0].yield = 30e6;
+  EXPECT_EQ(two.strength()["too_weak"], nlohmann::ordered_json({"lever", "knob"}));
+  EXPECT_THAT(two.text(), HasSubstr("; TOO WEAK too: \"knob\""));
+  two.materials[0].yield = 235e6;
   two.materials[1].strength = 40e6;
   two.result.stress->thin_walls = 0.9;  // what is safe without bending need not be
   EXPECT_FALSE(two.strength().contains("share"));
