@@ -239,8 +239,7 @@ void Run::warn_of_buckling(Mechanics& mechanics, Preconditioner* near) {
       linked = true;
       follows |= motion.link->follower;
     }
-  // The tangent knows rigid links only where they are held.
-  if (follows) report_following(!linked && has_positive_tangent(mechanics, state_) == true, progress_);
+  if (follows) report_following(has_positive_tangent(mechanics, state_) == true, progress_);
   const bool strained = body_.cell_columns.contains(kFreeStrainColumn);
   const bool loaded = std::any_of(mechanics.effects().begin(), mechanics.effects().end(), drives);
   if (!strained && (follows || !loaded || !judged_)) return;
@@ -252,9 +251,10 @@ void Run::warn_of_buckling(Mechanics& mechanics, Preconditioner* near) {
                       ? fmt::format("this equilibrium is not stable: the part buckles under {}, and what is "
                                     "told is as if it did not; {}",
                                     less,
-                                    strained ? "a small load to the side shows where it goes"
-                                             : "[run] buckling = 1 with model \"quadratic\" tells from which "
-                                               "load on")
+                                    strained || linked  // [run] buckling has neither
+                                        ? "a small load to the side shows where it goes"
+                                        : "[run] buckling = 1 with model \"quadratic\" tells from which "
+                                          "load on")
                       : "whether this equilibrium is stable was not found out: the part may buckle"));
 }
 

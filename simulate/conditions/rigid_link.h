@@ -8,6 +8,7 @@
 #include <cmath>
 #include <string>
 
+#include "base/math/small_matrices.h"
 #include "base/math/vec.h"
 
 namespace flexel::simulate {
@@ -33,6 +34,14 @@ struct RigidLink {
   // The force or the couple now.
   [[nodiscard]] Vec3 now(const Vec3& given) const {
     return follower && !small ? Vec3(given + turning(given)) : given;
+  }
+  // Its spin for a change of `turn` [rad/rad]: the left Jacobian of SO(3).
+  [[nodiscard]] Mat3 spin_of_turn() const {
+    const double angle = turn.norm();
+    if (small || angle < 1e-4) return Mat3::Identity() + (small ? 0 : 0.5) * cross_matrix(turn);
+    const Mat3 around = cross_matrix(turn / angle);
+    return Mat3::Identity() + (1 - std::cos(angle)) / angle * around +
+           (1 - std::sin(angle) / angle) * around * around;
   }
 
  private:

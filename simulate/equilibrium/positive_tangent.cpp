@@ -6,6 +6,7 @@
 
 #include "base/stop.h"
 #include "simulate/equilibrium/newton.h"
+#include "simulate/equilibrium/rigid_link_equilibrium.h"
 #include "simulate/linear/conjugate_gradients.h"
 #include "simulate/linear/multigrid.h"
 
@@ -41,7 +42,7 @@ std::optional<bool> has_positive_tangent(Mechanics& mechanics, const State& stat
       tangent, irregular, answer, preconditioner, kTolerance, kIterations, [](int, double) { check_stop(); },
       [](int, double) { return stop_is_due(); });
   if (result.indefinite) return false;
-  if (result.converged) return true;
+  if (result.converged) return links_are_stable(mechanics, state, preconditioner);
   return std::nullopt;
 }
 

@@ -8,7 +8,7 @@
 namespace flexel::simulate {
 
 // Whether the tangent at `state` is positive: conjugate gradients on irregular forces (N) meet no direction of negative
-// curvature. With loads that follow, its symmetric part: where that is not positive the equilibrium may be stable all
+// curvature, nor do motions of rigid links. With loads that follow, its symmetric part: where that is not positive the equilibrium may be stable all
 // the same. Nothing: they did not converge, or the run is to stop, under a StopWaits too. Assembles the tangent anew.
 // `near`: a preconditioner of Mechanics::tangent() as it was nearby, whose coarser levels are kept; null: one is made,
 // which takes longer than the rest.

@@ -16,6 +16,7 @@
 #include "base/error.h"
 #include "base/math/dense.h"
 #include "base/parallel.h"
+#include "base/stop.h"
 #include "simulate/linear/conjugate_gradients.h"
 #include "simulate/linear/multigrid.h"
 
@@ -42,6 +43,16 @@ std::vector<std::shared_ptr<RigidLink>> rigid_links(const Constraints& constrain
   return links;
 }
 
+std::vector<RigidLink> copies(const std::vector<std::shared_ptr<RigidLink>>& links) {
+  std::vector<RigidLink> result;
+  for (const auto& link : links) result.push_back(*link);
+  return result;
+}
+
+void restore(const std::vector<std::shared_ptr<RigidLink>>& links, const std::vector<RigidLink>& before) {
+  for (std::size_t l = 0; l < links.size(); ++l) *links[l] = before[l];
+}
+
 class Balance {
  public:
   Balance(Mechanics& mechanics, State& state, const NewtonOptions& options, const NewtonProgress& progress)
@@ -52,6 +63,8 @@ class Balance {
         links_(rigid_links(mechanics.constraints())) {}
 
   NewtonOutcome run();
+  // links_are_stable()
+  bool stable(const Preconditioner& preconditioner);
 
  private:
   [[nodiscard]] Eigen::Index unknowns() const { return static_cast<Eigen::Index>(6 * links_.size()); }
@@ -62,6 +75,7 @@ class Balance {
   LinkVector lacking(const State& state);
   std::vector<Vec3> free_forces(const State& state);
   Eigen::MatrixXd slope();
+  bool take_slope(const Preconditioner& preconditioner, Eigen::MatrixXd& slope);
   bool add_column(const Preconditioner& preconditioner, Eigen::Index j, Eigen::MatrixXd& slope);
   void correct(Eigen::MatrixXd& slope) const;
   void refuse_free(const Eigen::MatrixXd& slope) const;
@@ -170,11 +184,24 @@ void Balance::correct(Eigen::MatrixXd& slope) const {
     }
 }
 
+// With the tangent as it is; false when that has negative curvature.
+bool Balance::take_slope(const Preconditioner& preconditioner, Eigen::MatrixXd& slope) {
+  slope.setZero(unknowns(), unknowns());
+  response_.clear();
+  left_over_.clear();
+  bool good = true;
+  for (Eigen::Index j = 0; good && j < unknowns(); ++j) good = add_column(preconditioner, j, slope);
+  if (good) correct(slope);
+  response_.clear();
+  left_over_.clear();
+  return good;
+}
+
 // db/dq [N/m], the free elements following. A tangent with negative curvature is taken with the cells' moduli
 // projected to their positive part.
 Eigen::MatrixXd Balance::slope() {
   const ScopeTimer timer(outcome_.linear_seconds);
-  Eigen::MatrixXd slope = Eigen::MatrixXd::Zero(unknowns(), unknowns());
+  Eigen::MatrixXd slope;
   for (const bool project : {false, true}) {
     mechanics_.assemble(state_, {project, nullptr});
     mechanics_.eliminate_prescribed();
@@ -183,17 +210,20 @@ Eigen::MatrixXd Balance::slope() {
     const std::vector<Block> diagonal = mechanics_.tangent().diagonal();
     stiff_ = parallel_sum<double>(diagonal.size(), [&](std::size_t e) { return diagonal[e].trace(); }) /
              (3.0 * static_cast<double>(diagonal.size()));
-    response_.clear();
-    left_over_.clear();
-    bool good = true;
-    for (Eigen::Index j = 0; good && j < unknowns(); ++j) good = add_column(*preconditioner, j, slope);
-    if (!good) continue;
-    correct(slope);
-    break;
+    if (take_slope(*preconditioner, slope)) break;
   }
-  response_.clear();
-  left_over_.clear();
   return slope;
+}
+
+// By spins in place of changes of the rotation vectors: with loads that have an energy the slope is symmetric then.
+bool Balance::stable(const Preconditioner& preconditioner) {
+  Eigen::MatrixXd slope;
+  if (!take_slope(preconditioner, slope)) return false;
+  for (std::size_t l = 0; l < links_.size(); ++l) {
+    const auto at = static_cast<Eigen::Index>(6 * l + 3);
+    slope.middleCols<3>(at) = (slope.middleCols<3>(at) * links_[l]->spin_of_turn().inverse()).eval();
+  }
+  return eigenvalues_symmetric(-0.5 * (slope + slope.transpose())).minCoeff() > 0;
 }
 
 void Balance::refuse_free(const Eigen::MatrixXd& slope) const {
@@ -254,11 +284,9 @@ bool Balance::find() {
 }
 
 NewtonOutcome Balance::run() {
-  std::vector<RigidLink> before;
-  for (const auto& link : links_) before.push_back(*link);
+  const std::vector<RigidLink> before = copies(links_);
   outcome_.converged = find();
-  if (!outcome_.converged)
-    for (std::size_t l = 0; l < links_.size(); ++l) *links_[l] = before[l];
+  if (!outcome_.converged) restore(links_, before);
   return outcome_;
 }
 
@@ -269,6 +297,16 @@ NewtonOutcome newton_with_links(Mechanics& mechanics, State& state, const Newton
   if (rigid_links(mechanics.constraints()).empty())
     return newton(mechanics, state, options, progress, memory);
   return Balance(mechanics, state, options, progress).run();
+}
+
+bool links_are_stable(Mechanics& mechanics, State state, const Preconditioner& preconditioner) {
+  const std::vector<std::shared_ptr<RigidLink>> links = rigid_links(mechanics.constraints());
+  if (links.empty()) return true;
+  const std::vector<RigidLink> before = copies(links);
+  const bool stable =
+      Balance(mechanics, state, {}, [](double, const std::string&) { check_stop(); }).stable(preconditioner);
+  restore(links, before);
+  return stable;
 }
 
 }  // namespace flexel::simulate

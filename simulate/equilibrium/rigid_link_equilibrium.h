@@ -12,4 +12,9 @@ namespace flexel::simulate {
                                               const NewtonOptions& options, const NewtonProgress& progress,
                                               NewtonMemory* memory = nullptr);
 
+// Whether motions of the rigid links, the elements following, raise the energy at an equilibrium, whose positive tangent
+// Mechanics::tangent() holds, eliminated. A moment that keeps its direction has no energy: the symmetric part of its
+// stiffness counts. True without links.
+[[nodiscard]] bool links_are_stable(Mechanics& mechanics, State state, const Preconditioner& preconditioner);
+
 }  // namespace flexel::simulate

@@ -343,10 +343,8 @@ bool LinkBalance::stable(LinkedNodes& nodes, double share, double safety) {
   Eigen::MatrixXd slope = slope_;
   for (std::size_t l = 0; l < system_.linked().size(); ++l) {
     const RigidLink& link = *system_.linked()[l]->tie->motion.link;
-    Mat3 spins;  // of the three numbers that turn it
-    for (int axis = 0; axis < 3; ++axis) spins.col(axis) = link.reach * LinkDirection(link, 3 + axis).spin();
     const auto at = static_cast<Eigen::Index>(6 * l + 3);
-    slope.middleCols<3>(at) = (slope.middleCols<3>(at) * spins.inverse()).eval();
+    slope.middleCols<3>(at) = (slope.middleCols<3>(at) * link.spin_of_turn().inverse()).eval();
   }
   return eigenvalues_symmetric(-0.5 * (slope + slope.transpose())).minCoeff() > 0;
 }

@@ -1,6 +1,7 @@
 // Loads through a rigid link: the loaded face moves as one rigid body, in balance with its force and torque.
 #include "simulate/conditions/rigid_link.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -141,6 +142,34 @@ TEST(RigidLink, ReactionsBalance) {
   EXPECT_GT(result.largest_displacement, 1e-3);
   EXPECT_LT(result.imbalance.norm(), 1e-6 * force);
   EXPECT_LT(result.moment_imbalance.norm(), 1e-6 * moment);
+}
+
+// A column pressed along its axis stays straight, so only what is asked of the tangent tells that it buckles. Through a rigid
+// arm as long as itself, k L tan(k L) = 1 with k^2 = P / (E I): at .740 E I / L^2, and without one at pi^2 / 4.
+TEST(RigidLink, AColumnThatBucklesWithItsLinkIsTold) {
+  struct Case {
+    const char* model;
+    double arm, load;  // L, E I / L^2
+    bool stable;
+  };
+  const double length = 0.1, bending = 210e9 * std::pow(0.01, 4) / 12;
+  for (const Case& each :
+       {Case{"cells", 0, 2.2, true}, Case{"cells", 0, 2.8, false}, Case{"cells", 1, 0.66, true},
+        Case{"cells", 1, 0.82, false}, Case{"springs", 0, 3.6, false}, Case{"quadratic", 1, 0.66, true},
+        Case{"quadratic", 1, 0.82, false}}) {
+    Body body = testing::box_body({.cells = {20, 2, 2}, .spacing = Vec3::Constant(0.005)});
+    const bool springs = std::string(each.model) == "springs";
+    std::string material = kNoContraction;
+    if (springs) material.replace(material.find("poisson = 0"), 11, "poisson = 0.25");
+    const KeptWarnings kept;
+    solve(body, std::string("model = \"") + each.model + "\"\n" + material + kHeld +
+                    link(fmt::format("force = [\"{} N\", 0, 0]\nat = [\"{} m\", \"5 mm\", \"5 mm\"]",
+                                     -each.load * bending / length / length, (1 + each.arm) * length)));
+    std::string told;
+    for (const std::string& line : kept.lines()) told += line + "\n";
+    EXPECT_EQ(told.find("not stable") == std::string::npos, each.stable)
+        << each.model << ", arm " << each.arm << ", load " << each.load << ": " << told;
+  }
 }
 
 // Nothing holds the bar but the link, of a lattice that fits it and of one that is turned against its
