@@ -246,16 +246,17 @@ void Run::warn_of_buckling(Mechanics& mechanics, Preconditioner* near) {
   const std::optional<bool> stable = has_positive_tangent(mechanics, state_, strained ? nullptr : near);
   if (stable == true) return;
   const std::string less = strained ? "less heat or shrinkage than this" : "less than this load";
-  progress_.warn(scene_.name + ": " +
-                 (stable
-                      ? fmt::format("this equilibrium is not stable: the part buckles under {}, and what is "
-                                    "told is as if it did not; {}",
-                                    less,
-                                    strained || linked  // [run] buckling has neither
-                                        ? "a small load to the side shows where it goes"
-                                        : "[run] buckling = 1 with model \"quadratic\" tells from which "
-                                          "load on")
-                      : "whether this equilibrium is stable was not found out: the part may buckle"));
+  progress_.warn(
+      scene_.name + ": " +
+      (stable
+           ? fmt::format("this equilibrium is not stable: the part buckles under {}, and what is "
+                         "told is as if it did not; {}",
+                         less,
+                         strained ? "a small load to the side shows where it goes"
+                         : linked ? "smaller loads show from which on"  // [run] buckling has no rigid links
+                                  : "[run] buckling = 1 with model \"quadratic\" tells from which "
+                                    "load on")
+           : "whether this equilibrium is stable was not found out: the part may buckle"));
 }
 
 void count_work(const EquilibriumResult& solved, SimulateResult& result) {
