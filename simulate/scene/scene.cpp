@@ -158,6 +158,12 @@ void parse_time(TableReader& reader, RunSettings& run) {
   for (const auto& [key, value] :
        {std::pair{"time", run.time}, {"step", run.step}, {"history_every", run.history_every}})
     if (value && !(*value > 0)) reader.fail(fmt::format("\"{}\" needs to be above 0", key));
+  constexpr double kLeastShare = 1e-12;  // of the time: no run gets to the end of more steps
+  if (run.time && run.step && !(*run.step > kLeastShare * *run.time))
+    reader.fail(reader.find("step")->line,
+                fmt::format("\"step\" is under {:g} of \"time\", and no run takes so many steps: leave it "
+                            "out, and the run chooses its own",
+                            kLeastShare));
   if (run.time && reader.find("until")) reader.fail("[run] has both \"until\" and \"time\"; give one");
   if (!run.time && (run.step || run.history_every || run.frames || method))
     reader.fail("[run] has keys of a timed run but no \"time\", for example time = \"1 s\"");

@@ -123,6 +123,7 @@ TEST(Scene, RefusesWithLineAndReason) {
       {"[materials.x]\npoisson = 0.3\ndensity = \"1 kg/m3\"\n", "s.toml:1", "needs \"young\""},
       {"[run]\nuntil = \"tomorrow\"\n", "s.toml:2", "equilibrium"},
       {"[run]\ntolerance = 5\n", "s.toml:1", "tolerance"},
+      {"[run]\ntime = \"1 ms\"\nstep = \"1e-30 s\"\n", "s.toml:3", "leave it out"},
       {"[[probe]]\nname = \"p\"\n", "s.toml:1", "either \"at\""},
       {"[gravity]\nacceleration = [0, 0, nan]\n", "s.toml:2", "finite"},
       {"gravity = 3\n", "s.toml:1", "table"},
