@@ -19,6 +19,7 @@
 #include "tests/sanitized.h"
 #include "tests/simulate/box_body.h"
 #include "tests/simulate/centre_body.h"
+#include "tests/simulate/printed.h"
 #include "tests/simulate/scene_case.h"
 
 namespace flexel::simulate {

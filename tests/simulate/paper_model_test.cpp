@@ -14,6 +14,7 @@
 #include "simulate/effects/gravity.h"
 #include "tests/sanitized.h"
 #include "tests/simulate/derivatives.h"
+#include "tests/simulate/printed.h"
 #include "tests/simulate/study_beam.h"
 
 namespace flexel::simulate {

@@ -12,6 +12,7 @@
 #include "simulate/thermal/free_strain.h"
 #include "tests/simulate/centre_body.h"
 #include "tests/simulate/derivatives.h"
+#include "tests/simulate/printed.h"
 #include "tests/simulate/scene_case.h"
 #include "tests/simulate/stepped.h"
 
