@@ -380,4 +380,20 @@ Body at_resolution(const Body& body, const std::vector<std::uint8_t>& changed, R
   return made.finish(body, fields);
 }
 
+// Those that are there, and one in the middle of each edge, face and cell, which are told apart by two opposite corners.
+std::size_t finer_element_count(const Body& body, const Part& part) {
+  const std::size_t cells = part.cell_end - part.cell_begin;
+  std::size_t count = part.element_end - part.element_begin + cells;
+  std::vector<std::array<std::uint32_t, 2>> ends;
+  for (const std::size_t across : {1u, 2u, 4u, 3u, 5u, 6u}) {  // edges along an axis, faces along two
+    ends.clear();
+    for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c)
+      for (std::size_t a = 0; a < 8; ++a)
+        if (!(a & across)) ends.push_back({body.cell_elements[c][a], body.cell_elements[c][a | across]});
+    std::sort(ends.begin(), ends.end());
+    count += static_cast<std::size_t>(std::unique(ends.begin(), ends.end()) - ends.begin());
+  }
+  return count;
+}
+
 }  // namespace flexel::simulate

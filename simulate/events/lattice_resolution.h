@@ -30,4 +30,7 @@ enum class ResolutionChange { finer, coarser };
 [[nodiscard]] Body at_resolution(const Body& body, const std::vector<std::uint8_t>& changed,
                                  ResolutionChange to, std::vector<std::vector<Vec3>>& fields);
 
+// How many elements `part`, of corner placement, would have with cells of half the spacing.
+[[nodiscard]] std::size_t finer_element_count(const Body& body, const Part& part);
+
 }  // namespace flexel::simulate

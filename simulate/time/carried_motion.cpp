@@ -89,11 +89,11 @@ class FreeMotions {
 
 }  // namespace
 
-CarriedMotion::CarriedMotion(const Problem& problem, const State& state) {
+CarriedMotion::CarriedMotion(const Problem& problem, const State& state, double stored) {
   const std::vector<double> mass = lumped_masses(problem);
   for (const Part& part : problem.body.parts) momenta_.push_back(momenta_of(problem.body, part, state, mass));
   const auto [internal, kinetic] = internal_and_kinetic(problem, state, mass);
-  internal_ = internal;
+  internal_ = internal + stored;
   kinetic_ = kinetic;
 }
 
@@ -112,9 +112,9 @@ void CarriedMotion::give_back(const Problem& problem, const std::vector<std::uin
   }
 }
 
-std::string CarriedMotion::change_of_energy(const Problem& problem, const State& state,
+std::string CarriedMotion::change_of_energy(const Problem& problem, const State& state, double stored,
                                             const std::string& origin, Progress& progress) const {
-  const double now = internal_and_kinetic(problem, state, lumped_masses(problem))[0];
+  const double now = internal_and_kinetic(problem, state, lumped_masses(problem))[0] + stored;
   if (!std::isfinite(now))
     throw DivergedError(
         fmt::format("{}: on the new lattice a cell is folded: change the resolution where the "
