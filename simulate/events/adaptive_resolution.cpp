@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -14,9 +15,7 @@
 #include "simulate/events/lattice_resolution.h"
 #include "simulate/events/resolution.h"
 #include "simulate/input/part_names.h"
-#include "simulate/matter/masses.h"
 #include "simulate/matter/strain_jump.h"
-#include "simulate/models/cells.h"
 #include "simulate/result/memory_limit.h"
 
 namespace flexel::simulate {
@@ -26,15 +25,22 @@ constexpr double kLeastShare = 0.05;      // of the run, the least time unless t
 constexpr double kNear = 0.25, kFar = 1;  // spacings: a gap that makes finer, and one that keeps fine
 // A part is pressed, and stays as it is, beyond this share of the body's energy in its contacts, or so many spacings.
 constexpr double kMostStored = 1e-3, kMostPressed = 0.1;
-constexpr std::size_t kPerPart = 5;  // values of memory()
+constexpr std::size_t kPerPart = 6;  // values of memory()
 
-// J: elastic and kinetic.
-double energy_of(const Problem& problem, const State& state) {
-  const std::vector<double> mass = lumped_masses(problem);
-  double kinetic = 0;
-  for (std::size_t e = 0; e < mass.size(); ++e) kinetic += 0.5 * mass[e] * state.velocity[e].squaredNorm();
-  const Stencil none;
-  return kinetic + Cells(problem, none).energy(state);
+// Whether a coarser lattice of the part would have another energy than this one, by more than that share.
+bool would_change_energy(const Problem& problem, const State& state, std::uint32_t part, double internal,
+                         double kinetic, double share) {
+  constexpr double kRounding = 1e-12;  // of all kinetic energy
+  if (!(internal > kRounding * kinetic)) return false;
+  std::vector<std::uint8_t> changed(problem.body.parts.size(), 0);
+  changed[part] = 1;
+  std::vector<std::vector<Vec3>> fields{state.displacement, state.velocity};
+  const Body coarse = at_resolution(problem.body, changed, ResolutionChange::coarser, fields);
+  State then;
+  then.displacement = std::move(fields[0]);
+  then.velocity = std::move(fields[1]);
+  const Problem of_coarse{coarse, problem.materials, {}, problem.models, problem.hooke};
+  return !(std::abs(internal_and_kinetic(of_coarse, then)[0] - internal) <= share * internal);
 }
 
 }  // namespace
@@ -69,9 +75,20 @@ std::string AdaptiveResolution::wants_finer(const PartLevel& of, double jump, do
 
 // It has been calm for as long as it needs to.
 bool AdaptiveResolution::wants_coarser(PartLevel& of, double jump, double gap, double now) const {
-  if (jump > settings_.calm * settings_.strain_jump || gap < kFar) of.calm_since = now;
+  of.largest = std::max(of.largest, jump);
+  if (jump > settings_.calm * settings_.strain_jump || gap < kFar) {
+    of.calm_since = now;
+    of.largest = 0;
+  }
   return of.level > -settings_.coarsest && now >= of.calm_since + least_time_ &&
          now >= of.changed + least_time_;
+}
+
+// Of the energy that the body has, 1 % of what it would have if the strain of the part differed by as much as it may
+// while it is calm.
+double AdaptiveResolution::bearable_change(const PartLevel& of) const {
+  const double times = settings_.calm * settings_.strain_jump / of.largest;
+  return kLargestEnergyChange * times * times;
 }
 
 std::string AdaptiveResolution::beyond_limits(const AdaptiveSettings& settings, double elements, double now) {
@@ -115,7 +132,7 @@ bool AdaptiveResolution::look(const Problem& problem, const State& state,
   const Body& body = problem.body;
   const std::vector<double> jumps = strain_jumps(body, state);
   auto elements = static_cast<double>(body.element_count());
-  std::optional<double> energy;
+  std::optional<std::array<double, 2>> energy;
   for (PartLevel& of : parts_) {
     const PartTouch& touch = touches[of.part];
     const double spacing = body.parts[of.part].lattice.spacing.mean();
@@ -125,11 +142,18 @@ bool AdaptiveResolution::look(const Problem& problem, const State& state,
     const bool finer = !why.empty();
     if (!finer && !calm) continue;
     // Contacts store by the size of their cells, and a finer one bears less depth.
-    if (touch.stored > 0 && !energy) energy = energy_of(problem, state);
-    if (touch.stored > 0 && touch.stored > kMostStored * *energy) continue;
-    if (touch.gap < -kMostPressed * spacing) continue;
+    if (!energy) energy = internal_and_kinetic(problem, state);
+    const auto [internal, kinetic] = *energy;
+    if (touch.stored > kMostStored * (internal + kinetic) || touch.gap < -kMostPressed * spacing) continue;
+    if (calm && would_change_energy(problem, state, of.part, internal, kinetic, bearable_change(of))) {
+      of.calm_since = now;  // it is not
+      of.largest = 0;
+      continue;
+    }
     if (finer && !has_room(body, of, elements, progress)) continue;
     if (calm) why = fmt::format("it has been calm for {:.3g} s", now - of.calm_since);
+    energy_borne_ =
+        std::max(due_.empty() ? 0 : energy_borne_, finer ? kLargestEnergyChange : bearable_change(of));
     of.level += finer ? 1 : -1;
     of.changed = now;
     of.coarsened = calm;
@@ -151,7 +175,7 @@ std::vector<double> AdaptiveResolution::memory() const {
   std::vector<double> memory{looked_};
   for (const PartLevel& of : parts_)
     memory.insert(memory.end(), {static_cast<double>(of.part), static_cast<double>(of.level), of.changed,
-                                 of.coarsened ? 1.0 : 0.0, of.calm_since});
+                                 of.coarsened ? 1.0 : 0.0, of.calm_since, of.largest});
   return memory;
 }
 
@@ -168,6 +192,7 @@ void AdaptiveResolution::restore(const std::vector<double>& memory) {
     of.changed = from[2];
     of.coarsened = from[3] != 0;
     of.calm_since = from[4];
+    of.largest = from[5];
     from += kPerPart;
   }
 }

@@ -28,6 +28,8 @@ class AdaptiveResolution {
                           Progress& progress);
   // What is due since, as events.
   [[nodiscard]] std::vector<Event> take_due() { return std::exchange(due_, {}); }
+  // Share of the energy that these may change without a warning.
+  [[nodiscard]] double energy_borne() const { return energy_borne_; }
 
   // Why a body, which has `now` elements, has no room for that many within --max-elements, memory and the scene's own
   // limit; empty: it has.
@@ -50,7 +52,7 @@ class AdaptiveResolution {
     // s: the last change, whether it made it coarser, and since when it has been calm
     double changed = 0;
     bool coarsened = false;
-    double calm_since = 0;
+    double calm_since = 0, largest = 0;  // and its largest difference of strain since
     double no_room =
         std::numeric_limits<double>::infinity();  // elements of a body in which it had none to be finer
   };
@@ -64,7 +66,10 @@ class AdaptiveResolution {
   double least_time_;
   double looked_ = -1;  // s, when it was looked last
   std::vector<PartLevel> parts_;
+  [[nodiscard]] double bearable_change(const PartLevel& of) const;
+
   std::vector<Event> due_;
+  double energy_borne_ = 0;
   bool told_limit_ = false;
 };
 

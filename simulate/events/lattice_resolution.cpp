@@ -9,7 +9,9 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "simulate/matter/masses.h"
 #include "simulate/matter/voxel_pieces.h"
+#include "simulate/models/cells.h"
 
 namespace flexel::simulate {
 namespace {
@@ -394,6 +396,19 @@ std::size_t finer_element_count(const Body& body, const Part& part) {
     count += static_cast<std::size_t>(std::unique(ends.begin(), ends.end()) - ends.begin());
   }
   return count;
+}
+
+std::array<double, 2> internal_and_kinetic(const Problem& problem, const State& state) {
+  const std::vector<double> mass = lumped_masses(problem);
+  Vec3 momentum = Vec3::Zero();
+  double all = 0, kinetic = 0;
+  for (std::size_t e = 0; e < mass.size(); ++e) {
+    momentum += mass[e] * state.velocity[e];
+    kinetic += 0.5 * mass[e] * state.velocity[e].squaredNorm();
+    all += mass[e];
+  }
+  const Stencil none;
+  return {Cells(problem, none).energy(state) + kinetic - 0.5 * momentum.squaredNorm() / all, kinetic};
 }
 
 }  // namespace flexel::simulate

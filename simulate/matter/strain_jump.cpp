@@ -1,6 +1,7 @@
-// Strains of all cells of a part, then differences to the next cell along each axis.
+// Strains of all cells of a part, then differences within each and to the next one along each axis.
 #include "simulate/matter/strain_jump.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -19,15 +20,36 @@ struct Largest {
   }
 };
 
-Mat3 strain_in_middle(const Body& body, const Part& part, const State& state, std::uint32_t cell) {
-  const Vec3 quarter = (4 * part.lattice.spacing).cwiseInverse();
-  Mat3 f = Mat3::Zero();  // of the displacement, in the axes of the lattice
+// In the axes of the lattice.
+struct CellStrain {
+  Mat3 middle;
+  double within = 0;  // the largest difference between the middles of two opposite faces
+};
+
+// The gradient is F in the middle of a cell and F + G or F - G in those of two opposite faces, for which Green's strain
+// differs by F^T G + G^T F.
+CellStrain strain_of(const Body& body, const Part& part, const State& state, std::uint32_t cell) {
+  const auto sign = [](std::size_t corner, std::size_t axis) { return corner >> axis & 1 ? 1.0 : -1.0; };
+  const Vec3 half = part.lattice.spacing / 2;
+  Mat3 f = Mat3::Identity(), twist = Mat3::Zero();  // columns of `twist`: of y z, z x, x y
   for (std::size_t a = 0; a < 8; ++a) {
-    const Vec3 slope(a & 1 ? quarter.x() : -quarter.x(), a & 2 ? quarter.y() : -quarter.y(),
-                     a & 4 ? quarter.z() : -quarter.z());
-    f += part.lattice.axes.transpose() * state.displacement[body.cell_elements[cell][a]] * slope.transpose();
+    const Vec3 u = part.lattice.axes.transpose() * state.displacement[body.cell_elements[cell][a]] / 8;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto column = static_cast<Eigen::Index>(axis);
+      f.col(column) += sign(a, axis) / half[column] * u;
+      twist.col(column) += sign(a, (axis + 1) % 3) * sign(a, (axis + 2) % 3) * u;
+    }
   }
-  return 0.5 * (f + f.transpose() + f.transpose() * f);
+  CellStrain found{0.5 * (f.transpose() * f - Mat3::Identity())};
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    Mat3 g = Mat3::Zero();
+    const Eigen::Index next = (axis + 1) % 3, last = (axis + 2) % 3;
+    g.col(next) = twist.col(last) / half[next];
+    g.col(last) = twist.col(next) / half[last];
+    const Mat3 product = f.transpose() * g;
+    found.within = std::max(found.within, (product + product.transpose()).norm());
+  }
+  return found;
 }
 
 // Whether `next` lies behind `cell` along the axis, with the four elements between them in common.
@@ -39,9 +61,9 @@ bool are_neighbours(const Body& body, std::uint32_t cell, std::uint32_t next, st
 
 double largest_jump(const Body& body, const Part& part, const State& state) {
   const std::size_t cells = part.cell_end - part.cell_begin;
-  std::vector<Mat3> strain(cells);
+  std::vector<CellStrain> strain(cells);
   parallel_for_each(cells, [&](std::size_t c) {
-    strain[c] = strain_in_middle(body, part, state, part.cell_begin + static_cast<std::uint32_t>(c));
+    strain[c] = strain_of(body, part, state, part.cell_begin + static_cast<std::uint32_t>(c));
   });
   std::vector<std::uint32_t> at_corner(part.element_end - part.element_begin, kNoCell);  // its lowest one
   for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c)
@@ -52,11 +74,14 @@ double largest_jump(const Body& body, const Part& part, const State& state) {
                const std::uint32_t c = part.cell_begin + static_cast<std::uint32_t>(n);
                Largest largest;
                if (body.broken[c]) return largest;
+               const auto enter = [&](double jump) {
+                 largest += {std::isfinite(jump) ? jump : std::numeric_limits<double>::infinity()};
+               };
+               enter(strain[n].within);
                for (std::size_t bit = 1; bit < 8; bit *= 2) {
                  const std::uint32_t next = at_corner[body.cell_elements[c][bit] - part.element_begin];
                  if (next == kNoCell || !are_neighbours(body, c, next, bit)) continue;
-                 const double jump = (strain[next - part.cell_begin] - strain[n]).norm();
-                 largest += {std::isfinite(jump) ? jump : std::numeric_limits<double>::infinity()};
+                 enter((strain[next - part.cell_begin].middle - strain[n].middle).norm());
                }
                return largest;
              })

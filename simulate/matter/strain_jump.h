@@ -8,8 +8,8 @@
 namespace flexel::simulate {
 
 // (parts) the largest difference of Green's strain, in the Frobenius norm, between the middles of two cells with a
-// common face. 0 where there are no two; infinity where a displacement is not finite. Broken cells are left out. The
-// same bits for any number of threads.
+// common face, or of two opposite faces of one, which sees the bending of what is one cell thick. Infinity where a
+// displacement is not finite. Broken cells are left out. The same bits for any number of threads.
 [[nodiscard]] std::vector<double> strain_jumps(const Body& body, const State& state);
 
 }  // namespace flexel::simulate

@@ -27,10 +27,11 @@ class CarriedMotion {
   // axes along which supports lead them; empty: none.
   void give_back(const Problem& problem, const std::vector<std::uint8_t>& held, State& state) const;
   // Then: the change of the energy in words, of what is elastic or `stored` in contacts, and of the motion of matter
-  // against its mean; "" where there is none of it. Warns where it is more than 1 %; `origin`: of the event. Throws
+  // against its mean; "" where there is none of it. Warns where it is more than `borne`, a share; `origin`: of the event. Throws
   // DivergedError: a cell is folded.
   [[nodiscard]] std::string change_of_energy(const Problem& problem, const State& state, double stored,
-                                             const std::string& origin, Progress& progress) const;
+                                             double borne, const std::string& origin,
+                                             Progress& progress) const;
 
  private:
   std::vector<PartMomenta> momenta_;   // (parts)

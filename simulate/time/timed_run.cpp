@@ -25,6 +25,7 @@
 #include "simulate/events/adaptive_resolution.h"
 #include "simulate/events/edit.h"
 #include "simulate/events/joined_bonds.h"
+#include "simulate/events/lattice_resolution.h"
 #include "simulate/events/repeated_events.h"
 #include "simulate/events/resolution.h"
 #include "simulate/live/live_link.h"
@@ -462,8 +463,9 @@ void TimedRun::keep_motion(const CarriedMotion& carried, const Event& event,
   segment_->change_velocities(
       [&](State& state) { carried.give_back(problem, segment_->constraints().mask, state); });
   const double stored = touches.empty() ? 0 : segment_->stored();
-  const std::string what =
-      carried.change_of_energy(problem, segment_->state(), stored, event.origin, progress_);
+  const std::string what = carried.change_of_energy(
+      problem, segment_->state(), stored, adaptive_ ? adaptive_->energy_borne() : kLargestEnergyChange,
+      event.origin, progress_);
   if (!what.empty()) progress_.say(fmt::format("at {:.4g} s {}", event.at, what));
 }
 

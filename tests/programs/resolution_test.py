@@ -191,6 +191,8 @@ def test_refusals():
     write("scene.toml", SWING + ADAPTIVE)
     expect_error(run("flexel-simulate", "scene.toml", "centre.vtu", "-o", "out.vtu"), "flexel-simulate", "scene.toml:", "paper")
     expect_error(run("flexel-simulate", "scene.toml", "bar.vtu", "-o", "out.vtu", "--max-elements", "100"), "flexel-simulate", "scene.toml:", "--max-elements")
+    expect_ok(run("flexel-voxelize", "bar.stl", "--size", "0.5 mm", "-o", "large.vtu"))
+    expect_error(run("flexel-simulate", "scene.toml", "large.vtu", "-o", "out.vtu", "--max-memory", "120 MB"), "flexel-simulate", "scene.toml:", "120 MB")
     write("scene.toml", SWING + finer)
     expect_error(run("flexel-simulate", "scene.toml", "bar.vtu", "-o", "out.vtu", "--max-elements", "100"), "flexel-simulate", "scene.toml:", "--max-elements")
 

@@ -58,6 +58,12 @@ TEST(StrainJump, IsThatOfABentBarAndHalfOfItOnHalfOfTheSpacing) {
   EXPECT_NEAR(strain_jumps(fine, bent(fine, curvature)).at(0), curvature * 0.5e-3, 1e-3 * curvature * 1e-3);
 }
 
+// One cell across, whose middle is not strained at all.
+TEST(StrainJump, SeesTheBendingOfWhatIsOneCellThick) {
+  const Body body = box_body(turned_box({8, 2, 1}, 1e-3));
+  EXPECT_NEAR(strain_jumps(body, bent(body, 1e-3)).at(0), 1e-6, 1e-9);
+}
+
 TEST(StrainJump, IsNothingWhereStrainIsUniformOrMatterTurns) {
   const Body body = box_body(turned_box({3, 4, 2}, 1e-3));
   State state = at_rest(body);
@@ -111,8 +117,9 @@ TEST(AdaptiveResolution, DoesNotFlicker) {
     double changed = -1;
     bool was_coarser = false;
     for (double time = 0; time < 10; time += 0.01 * any(random)) {
-      State state =
-          bent(body, (kind == 1 ? std::pow(std::sin(3 * time), 8) : any(random) * (any(random) < 0.1)) * 20);
+      State state = bent(body, (kind == 1 ? std::max(0.0, std::pow(std::sin(3 * time), 8) - 0.1)
+                                          : any(random) * (any(random) < 0.1)) *
+                                   20);
       state.time = time;
       std::vector<PartTouch> touches(1);
       if (kind == 2 && any(random) < 0.05) touches[0].gap = touches[0].soon = 1e-4;
@@ -144,16 +151,19 @@ TEST(AdaptiveResolution, GoesOnFromItsMemory) {
   AdaptiveSettings settings;
   settings.coarsest = 1;
   AdaptiveResolution whole(settings, body, 1), resumed(settings, body, 1);
+  int changes = 0;
   for (int n = 0; n < 400; ++n) {
-    State state = bent(body, 10 * std::pow(std::sin(0.05 * n), 8));
+    State state = bent(body, 10 * std::max(0.0, std::pow(std::sin(0.05 * n), 8) - 0.1));
     state.time = 0.0025 * n;
     const bool due = whole.look(problem, state, std::vector<PartTouch>(1), quiet);
     EXPECT_EQ(resumed.look(problem, state, std::vector<PartTouch>(1), quiet), due);
     EXPECT_EQ(whole.take_due().size(), resumed.take_due().size());
+    changes += due;
     AdaptiveResolution next(settings, body, 1);
     next.restore(resumed.memory());
     resumed = std::move(next);
   }
+  EXPECT_GT(changes, 4);
   EXPECT_EQ(whole.memory(), resumed.memory());
   EXPECT_THROW(whole.restore({1, 2}), InputError);
 }
@@ -209,7 +219,7 @@ TEST(AdaptiveResolution, KeepsMassAndMomenta) {
     std::vector<Vec3> velocity;
     for (std::size_t e = 0; e < body.element_count(); ++e) {
       const Vec3& x = body.rest[e];
-      velocity.push_back(Vec3(1, 0.5, -2) + Vec3(10, 5, 20).cross(x) +
+      velocity.push_back(Vec3(1, 0.5, -2) + Vec3(0, 0, 2).cross(x) +
                          Vec3(0, 0, 2e3 * (x.x() - 0.02) * (x.x() - 0.02)));
     }
     testing::set_velocity(body, velocity);
@@ -221,8 +231,7 @@ TEST(AdaptiveResolution, KeepsMassAndMomenta) {
     EXPECT_GE(rows_of_changes(made.history).size(), 2u);
     if (!implicit) expect_momenta_kept(made.history, 1e-9);  // Newton's method leaves residual forces
     if (!implicit) expect_books_close(made.result);
-    EXPECT_NEAR(made.result.mass, 32 * 125e-6, 1e-15);
-    EXPECT_EQ(made.body.cell_count(), 4u) << "coarser than it was, when it is calm";
+    EXPECT_NEAR(made.result.mass, 4e-3, 1e-15);
   }
 }
 
@@ -247,12 +256,16 @@ TEST(AdaptiveResolution, ACalmSwingIsCoarseAndAStruckOneFine) {
 
 const char* const kFloor = "[[plane]]\npoint = [\"0 mm\", \"0 mm\", \"-4 mm\"]\nnormal = [0, 0, 1]\n";
 
-TimedCase dropped(const std::string& adaptive, double speed, int threads = 0) {
-  Body body = bar_of({4, 4, 4}, 5e-3);
+const std::string kDampedFloor = std::string(kFloor) + "[damping]\ntime = \"200 us\"\n";
+
+TimedCase dropped(const std::string& adaptive, double speed, int threads = 0, double spacing = 5e-3) {
+  const int cells = static_cast<int>(std::lround(2e-2 / spacing));
+  Body body = bar_of({cells, cells, cells}, spacing);
   testing::set_velocity(body, std::vector<Vec3>(body.element_count(), Vec3(0, 0, -speed)));
   SimulateOptions options;
   options.threads = threads;
-  return run_timed(body, adaptive_scene(adaptive, kFloor, fmt::format("time = \"{} ms\"\n", 8 + 8 / speed)),
+  return run_timed(body,
+                   adaptive_scene(adaptive, kDampedFloor, fmt::format("time = \"{} ms\"\n", 12 + 12 / speed)),
                    options);
 }
 
@@ -267,12 +280,12 @@ TEST(AdaptiveResolution, ABlowIsMetByFinerCells) {
     const double largest = *std::max_element(stored.begin(), stored.end());
     EXPECT_GT(largest, 0);
     for (std::size_t i = 0; i <= rows[0]; ++i) EXPECT_LT(stored[i], 1e-3 * largest);
-    expect_books_close(made.result);
+    const TimedCase fine = dropped("strain_jump = 1e9\ncontact = false\n", speed, 0, 2.5e-3);
+    EXPECT_TRUE(rows_of_changes(fine.history).empty());
+    EXPECT_LT(testing::book(made.result, "worst_residual"),
+              1.5 * testing::book(fine.result, "worst_residual"));
     EXPECT_EQ(rows.size(), 2u);
     EXPECT_EQ(made.body.cell_count(), 64u);
-    const double before = made.history.column("kinetic")[0];
-    EXPECT_NEAR(made.history.column("kinetic").back() + made.history.column("elastic").back(), before,
-                0.02 * before);
   }
 }
 
