@@ -2,6 +2,7 @@
 
 import csv
 import math
+import os
 import re
 
 from harness import expect, expect_error, expect_ok, expect_only, main, run, write
@@ -162,6 +163,24 @@ def test_a_resumed_run_adapts_with_the_same_bytes():
     write("scene.toml", SWING + ADAPTIVE.replace("0.001", "0.003"))
     told = resumed_run_has_the_same_bytes()
     expect(told.count("elements became") >= 4, told)
+
+
+def test_a_resumed_run_that_meets_a_floor_has_the_same_bytes():
+    """It becomes finer before it touches, bounces, and is as it was at the end; explicit steps, and implicit ones."""
+    bent_bar("5 mm")
+    fall = (GUM.split("[[fix]]")[0] + '[damping]\ntime = "200 us"\n[[plane]]\npoint = ["0 mm", "0 mm", "-6 mm"]\nnormal = [0, 0, 1]\nfriction = 0.3\n'
+            '[[velocity]]\nwhere = "bar"\nvelocity = ["0.1 m/s", "0 m/s", "-0.5 m/s"]\n[run]\ntime = "80 ms"\nhistory_every = "1 ms"\n')
+    for method in ("", 'method = "implicit"\nstep = "0.2 ms"\n'):
+        write("scene.toml", fall + method + 'resolution = "adaptive"\n[adaptive]\nstrain_jump = 0.1\nleast_time = "3 ms"\n')
+        told = resumed_run_has_the_same_bytes()
+        finer = [int(after) > int(before) for before, after in re.findall(r"(\d+) elements became (\d+), for", told)]
+        expect(finer == [True, False], told)
+        rows = list(csv.DictReader(open("whole.csv")))
+        first = float(re.search(r"at ([\d.e-]+) s resolution", told)[1])
+        pressed = [float(row["time [s]"]) for row in rows if float(row["contact stored [J]"]) > 0]
+        expect(pressed and first <= pressed[0], f"finer at {first} s, pressed from {pressed[:1]}")
+        for name in ("whole.vtu", "whole.csv", "out.vtu", "out.csv", "run.checkpoint"):
+            os.remove(name)
 
 
 def test_refusals():

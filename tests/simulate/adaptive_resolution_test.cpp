@@ -313,8 +313,19 @@ TEST(AdaptiveResolution, StaysWithinItsBounds) {
   EXPECT_EQ(elements(""), 2 * 729u);
   EXPECT_EQ(elements("max_elements = 1457\n"), 729u + 125u);
   EXPECT_EQ(elements("parts = [\"second\"]\n"), 729u + 125u);
+  EXPECT_EQ(elements("parts = [\"second\"]\nfinest = 2\n"), 4913u + 125u);
   const TimedCase coarse = dropped("strain_jump = 0.5\nfinest = 0\ncoarsest = 1\nleast_time = \"1 ms\"\n", 1);
   EXPECT_EQ(coarse.body.cell_count(), 8u);
+}
+
+// While nothing changes it is the run of a scene that does not ask for it.
+TEST(AdaptiveResolution, LooksWithoutATrace) {
+  const std::string load = "[[fix]]\nwhere = \"xmin\"\n[[load]]\nwhere = \"xmax\"\nforce = [0, 0, \"1 N\"]\n";
+  const Scene adaptive = adaptive_scene("strain_jump = 1e9\n", load + kFloor, "time = \"20 ms\"\n");
+  Scene fixed = adaptive;
+  fixed.run.adaptive.reset();
+  EXPECT_EQ(run_timed(bar_of({8, 2, 2}, 5e-3), adaptive).body.position,
+            run_timed(bar_of({8, 2, 2}, 5e-3), fixed).body.position);
 }
 
 TEST(AdaptiveResolution, RefusesByName) {
