@@ -48,7 +48,8 @@ namespace {
 
 constexpr int kCheck = 100;  // steps between checks; implicit ones are checked one by one
 constexpr int kFastCheck = 25;
-constexpr int kTouchCheck = 5;       // where contact makes parts finer, in a faster motion still
+// Steps between looks at what resolution parts want; with contact in a fast motion
+constexpr int kLook = 25, kTouchLook = 5;
 constexpr std::size_t kRows = 1000;  // of the history, unless the scene says otherwise
 constexpr std::size_t kFrames = 50;  // likewise
 constexpr double kSameTime = 1e-12;  // share of a time
@@ -74,6 +75,7 @@ class TimedRun {
   void enter_half_step();
   void look_beyond_end();
   [[nodiscard]] bool is_due() const;
+  [[nodiscard]] bool looks() const;
   [[nodiscard]] bool wants_change();
   EnergyBalance end_act();
   void apply(std::span<const Event> happening);
@@ -351,24 +353,25 @@ void TimedRun::enter_half_step() {
   if (segment_->kicks()) segment_->kick(-0.5 * clock_.step);
 }
 
-// Of state and clock alone: a run that is resumed checks at the same steps.
+// These two of state and clock alone: a run that is resumed checks and looks at the same steps.
 bool TimedRun::is_due() const {
-  const auto fast = [&](int every, int before) {
-    return clock_.steps % static_cast<std::uint64_t>(every) == 0 && segment_->is_fast(clock_, before);
-  };
-  if (segment_->is_implicit()) return true;
-  if (!adaptive_) return clock_.steps % kCheck == 0 || fast(kFastCheck, kCheck);
-  return clock_.steps % kFastCheck == 0 || (scene_.get<Contact>().on && fast(kTouchCheck, kFastCheck));
+  return segment_->is_implicit() || clock_.steps % kCheck == 0 ||
+         (clock_.steps % kFastCheck == 0 && segment_->is_fast(clock_, kCheck));
 }
 
-// Of the state that was checked. Surfaces that may touch before the next check count.
-bool TimedRun::wants_change() {
+bool TimedRun::looks() const {
   if (!adaptive_) return false;
-  const int steps = segment_->is_implicit()                 ? 1
-                    : segment_->is_fast(clock_, kFastCheck) ? kTouchCheck
-                                                            : kFastCheck;
-  return adaptive_->look(segment_->problem(), segment_->state(), segment_->touches(steps * clock_.step),
-                         progress_);
+  return segment_->is_implicit() || clock_.steps % kLook == 0 ||
+         (clock_.steps % kTouchLook == 0 && scene_.get<Contact>().on && segment_->is_fast(clock_, kLook));
+}
+
+// Surfaces that may touch before the next look count.
+bool TimedRun::wants_change() {
+  const int steps = segment_->is_implicit() ? 1 : segment_->is_fast(clock_, kLook) ? kTouchLook : kLook;
+  const std::vector<PartTouch> touches = segment_->touches(steps * clock_.step);
+  if (!adaptive_->look(segment_->problem(), segment_->state(), touches, progress_)) return false;
+  segment_->refuse_unsound();
+  return true;
 }
 
 // From the beginning of an act to its end, or from where a checkpoint has it to there; or to where a part changes its
@@ -378,7 +381,7 @@ void TimedRun::play_until(double end, bool resumed) {
   const bool first = clock_.steps == 0 && goes_on() && !resumed;
   clock_.until = end;
   if (goes_on() && !resumed) segment_->choose_step(clock_);
-  if (clock_.steps == 0 && goes_on() && !resumed && wants_change()) return;
+  if (clock_.steps == 0 && goes_on() && !resumed && looks() && wants_change()) return;
   if (goes_on() && at_whole_step_) enter_half_step();
   if ((first || resumed) && options_.explain) {
     segment_->explain(clock_);
@@ -391,9 +394,8 @@ void TimedRun::play_until(double end, bool resumed) {
   if (!history_ && !relaxation_) segment_->spare_mass();
   segment_->unload();
   while (goes_on()) {
-    const bool due = is_due() || segment_->needs_step_recheck();
-    if (due || stop_is_due()) check();
-    if (due && wants_change()) return;
+    if (is_due() || segment_->needs_step_recheck() || stop_is_due()) check();
+    if (looks() && wants_change()) return;
     segment_->renew_damping(clock_);
     step();
     if (has_frames() && *segment_->state().time >= due_.frame * (1 - 1e-9)) write_frame();
