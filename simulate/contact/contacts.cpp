@@ -202,6 +202,31 @@ bool Contacts::needs_step_recheck(const State& state) {
   return bound_.is_exceeded();
 }
 
+// Two parts come nearer by no more than both of them move.
+void Contacts::add_touches(const State& state, double ahead, std::vector<PartTouch>& touches) {
+  if (points().empty()) return;
+  update(state, true);
+  if (states_.active().empty()) return;
+  const std::vector<Part>& parts = surface_.body().parts;
+  std::vector<double> way(parts.size(), 0);  // m
+  for (std::size_t p = 0; p < parts.size(); ++p)
+    for (std::uint32_t e = parts[p].element_begin; e < parts[p].element_end; ++e)
+      way[p] = std::max(way[p], ahead * state.velocity[e].norm());
+  for (const std::uint32_t n : states_.active()) {
+    const ContactPair& pair = list_.pairs()[n];
+    const PairState& now = states_[n];
+    const std::uint32_t i = list_.point(pair.i).part, j = pair.of_plane() ? i : list_.point(pair.j).part;
+    const double soon = now.gap - way[i] - (pair.of_plane() ? 0 : way[j]);
+    const auto enter = [&](std::uint32_t part) {
+      touches[part].gap = std::min(touches[part].gap, now.gap);
+      touches[part].soon = std::min(touches[part].soon, soon);
+      touches[part].stored += now.energy;
+    };
+    enter(i);
+    if (j != i) enter(j);
+  }
+}
+
 std::vector<double> Contacts::memory() const {
   std::vector<double> memory{list_.built() ? 1.0 : 0.0,
                              bound_.bound(),

@@ -8,6 +8,7 @@
 #pragma once
 #include <utility>
 
+#include "simulate/conditions/part_touch.h"
 #include "simulate/contact/contact_friction.h"
 #include "simulate/contact/contact_step_bound.h"
 #include "simulate/contact/implicit_contact.h"
@@ -77,6 +78,10 @@ class Contacts {
   // Whether more is needed than frequency() said last. The displacements are these until the next
   // finish_step(): the pairs are not looked at again.
   [[nodiscard]] bool needs_step_recheck(const State& state);
+
+  // As the hook of simulate/effects/effect.h; not before the first frequency() of explicit steps, which refuses
+  // what overlaps.
+  void add_touches(const State& state, double ahead, std::vector<PartTouch>& touches);
 
   // Pairs under pressure, as numbers of points (a plane: behind the last point), ascending.
   [[nodiscard]] std::vector<std::array<std::uint32_t, 2>> touching(const State& state);

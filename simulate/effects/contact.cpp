@@ -266,6 +266,10 @@ bool Contact::needs_step_recheck(const State& state) {
   return contacts_->needs_step_recheck(state);
 }
 
+void Contact::add_touches(const State& state, double ahead, std::vector<PartTouch>& touches) {
+  contacts_->add_touches(state, ahead, touches);
+}
+
 std::vector<double> Contact::memory() const {
   return contacts_->memory();
 }

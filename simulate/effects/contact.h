@@ -78,6 +78,7 @@ class Contact : public Effect {
   [[nodiscard]] bool settles(const State& found) override;
   void end_implicit_step(const State& state, const StepDone& done,
                          const std::vector<Vec3>& supports) override;
+  void add_touches(const State& state, double ahead, std::vector<PartTouch>& touches) override;
   [[nodiscard]] std::vector<double> memory() const override;
   void restore(const std::vector<double>& memory) override;
   [[nodiscard]] std::vector<double> transfer_state() const override;

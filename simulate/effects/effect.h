@@ -20,6 +20,7 @@
 
 #include "simulate/conditions/constraints.h"
 #include "simulate/conditions/kernel_effects.h"
+#include "simulate/conditions/part_touch.h"
 #include "simulate/input/scene_table.h"
 #include "simulate/models/stiffness.h"
 #include "simulate/result/result.h"
@@ -179,6 +180,9 @@ class Effect {
   // The step has led to `state`, and the books have it. `supports`: N (elements), on those that are led.
   virtual void end_implicit_step(const State& /*state*/, const StepDone&,
                                  const std::vector<Vec3>& /*supports*/) {}
+
+  // Enters in `touches` (parts) what touches each part in this state, or may within `ahead` s.
+  virtual void add_touches(const State&, double /*ahead*/, std::vector<PartTouch>& /*touches*/) {}
 
   // What goes on from step to step, for checkpoints.
   [[nodiscard]] virtual std::vector<double> memory() const { return {}; }

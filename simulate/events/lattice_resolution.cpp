@@ -9,7 +9,9 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "simulate/matter/masses.h"
 #include "simulate/matter/voxel_pieces.h"
+#include "simulate/models/cells.h"
 
 namespace flexel::simulate {
 namespace {
@@ -378,6 +380,35 @@ Body at_resolution(const Body& body, const std::vector<std::uint8_t>& changed, R
     made.append(to == ResolutionChange::finer ? split(std::move(lattice)) : merge(lattice));
   }
   return made.finish(body, fields);
+}
+
+// Those that are there, and one in the middle of each edge, face and cell, which are told apart by two opposite corners.
+std::size_t finer_element_count(const Body& body, const Part& part) {
+  const std::size_t cells = part.cell_end - part.cell_begin;
+  std::size_t count = part.element_end - part.element_begin + cells;
+  std::vector<std::array<std::uint32_t, 2>> ends;
+  for (const std::size_t across : {1u, 2u, 4u, 3u, 5u, 6u}) {  // edges along an axis, faces along two
+    ends.clear();
+    for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c)
+      for (std::size_t a = 0; a < 8; ++a)
+        if (!(a & across)) ends.push_back({body.cell_elements[c][a], body.cell_elements[c][a | across]});
+    std::sort(ends.begin(), ends.end());
+    count += static_cast<std::size_t>(std::unique(ends.begin(), ends.end()) - ends.begin());
+  }
+  return count;
+}
+
+std::array<double, 2> internal_and_kinetic(const Problem& problem, const State& state) {
+  const std::vector<double> mass = lumped_masses(problem);
+  Vec3 momentum = Vec3::Zero();
+  double all = 0, kinetic = 0;
+  for (std::size_t e = 0; e < mass.size(); ++e) {
+    momentum += mass[e] * state.velocity[e];
+    kinetic += 0.5 * mass[e] * state.velocity[e].squaredNorm();
+    all += mass[e];
+  }
+  const Stencil none;
+  return {Cells(problem, none).energy(state) + kinetic - 0.5 * momentum.squaredNorm() / all, kinetic};
 }
 
 }  // namespace flexel::simulate

@@ -13,10 +13,12 @@
 // Coarser. Elements at every second place stay as they are, the others go. Eight cells become one with the
 // mean of their fills. So coarser after finer gives back what was there before, to the bit.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <vector>
 
 #include "formats/lattice/body.h"
+#include "simulate/state/state.h"
 
 namespace flexel::simulate {
 
@@ -29,5 +31,13 @@ enum class ResolutionChange { finer, coarser };
 // larger ones.
 [[nodiscard]] Body at_resolution(const Body& body, const std::vector<std::uint8_t>& changed,
                                  ResolutionChange to, std::vector<std::vector<Vec3>>& fields);
+
+// How many elements `part`, of corner placement, would have with cells of half the spacing.
+[[nodiscard]] std::size_t finer_element_count(const Body& body, const Part& part);
+
+// J: elastic, and kinetic but of the motion of all as one; all kinetic. What a change of resolution is judged by.
+[[nodiscard]] std::array<double, 2> internal_and_kinetic(const Problem& problem, const State& state);
+// Share of the first beyond which a warning tells of a change.
+inline constexpr double kLargestEnergyChange = 0.01;
 
 }  // namespace flexel::simulate

@@ -92,7 +92,11 @@ ResolutionEvent ResolutionEvent::parse(TableReader& reader) {
 }
 
 std::vector<std::uint8_t> ResolutionEvent::changed_parts(const Body& body) const {
-  std::vector<std::uint8_t> changed(body.parts.size(), part_.empty());
+  std::vector<std::uint8_t> changed(body.parts.size(), part_.empty() && !number_);
+  if (number_) {
+    changed.at(*number_) = 1;
+    return changed;
+  }
   std::vector<std::string> names;
   for (std::size_t p = 0; p < body.parts.size(); ++p) {
     names.push_back(body.parts[p].name);
@@ -117,9 +121,11 @@ std::string ResolutionEvent::apply(EventContext& context) const try {
   if (!context.settled.empty()) fields.push_back(context.settled);
   Body made = at_resolution(body, parts, to_, fields);
   if (!state.time) check_elements(static_cast<double>(made.element_count()), origin_);
-  const std::string told = fmt::format("{}: {} elements became {}",
-                                       part_.empty() ? "every part" : fmt::format("part \"{}\"", part_),
-                                       count_elements(body, parts), count_elements(made, parts));
+  const std::string& changed = number_ ? body.parts[*number_].name : part_;
+  std::string told = fmt::format("{}: {} elements became {}",
+                                 changed.empty() ? "every part" : fmt::format("part \"{}\"", changed),
+                                 count_elements(body, parts), count_elements(made, parts));
+  if (!why_.empty()) told += fmt::format(", for {}", why_);
   state.displacement = std::move(fields[0]);
   state.velocity = std::move(fields[1]);
   if (!context.settled.empty()) context.settled = std::move(fields[2]);

@@ -197,7 +197,11 @@ void parse_modes(TableReader& reader, RunSettings& run) {
 RunSettings parse_run(TableReader& root) {
   RunSettings run;
   const SceneValue* table = root.find("run");
-  if (!table) return run;
+  if (!table) {
+    if (const SceneValue* adaptive = root.find("adaptive"))
+      root.fail(adaptive->line, "[adaptive] needs resolution = \"adaptive\" in [run]");
+    return run;
+  }
   TableReader reader(*table, root.file(), "[run]");
   if (const std::optional<std::string> until = reader.text("until"); until && *until != "equilibrium")
     reader.fail(
@@ -210,6 +214,7 @@ RunSettings parse_run(TableReader& root) {
   run.load_steps = whole_number(reader, "load_steps", 10000).value_or(run.load_steps);
   run.newton_iterations = whole_number(reader, "newton_iterations", 1000000);
   parse_modes(reader, run);
+  run.adaptive = parse_adaptive(root, reader);
   if (const SceneValue* value = reader.find("renormalise")) {
     if (value->kind != SceneValue::Kind::boolean)
       reader.fail(value->line, "\"renormalise\" needs to be true or false");

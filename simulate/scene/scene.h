@@ -13,6 +13,7 @@
 #include "simulate/effects/loads.h"
 #include "simulate/effects/supports.h"
 #include "simulate/events/event.h"
+#include "simulate/input/adaptive_settings.h"
 #include "simulate/input/infill.h"
 #include "simulate/input/materials.h"
 #include "simulate/input/scene_selection.h"
@@ -58,6 +59,7 @@ struct RunSettings {
   std::optional<int> modes;     // natural vibrations that are wanted; nothing: equilibrium
   std::optional<int> buckling;  // shapes of buckling, likewise
   bool renormalise = false;     // the shape at the end becomes the rest shape (simulate/models/rest_shape.h)
+  std::optional<AdaptiveSettings> adaptive;  // of timed runs; nothing: lattices stay as they are
 };
 
 struct Scene {

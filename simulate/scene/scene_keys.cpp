@@ -82,6 +82,7 @@ SceneKeyGroup run_keys() {
            {r, "modes", K::whole_number, {}, "", "natural vibrations in place of equilibrium: how many"},
            {r, "buckling", K::whole_number, {}, "", "load factors and shapes of buckling: how many"},
            {r, "renormalise", K::flag, {}, "false", "the shape at the end becomes the rest shape"},
+           {r, "resolution", K::text, {}, "\"fixed\"", "or \"adaptive\", of a timed run"},
            {p, "name", K::text, {}, "probe N", "for the summary"},
            {p, "at", K::vector, D::length, "", "a material point; or where"},
            {p, "where", K::selection, {}, "", "whose mean displacement is told"}}};
@@ -115,6 +116,28 @@ SceneKeyGroup event_keys() {
            {e, "velocity", K::vector, D::velocity, "0", "of add: what it comes with"},
            {e, "change", K::text, {}, "required", "of resolution: \"finer\" or \"coarser\""},
            {e, "part", K::text, {}, "every part", "of resolution: a part's name"}}};
+}
+
+SceneKeyGroup adaptive_keys() {
+  const std::string a = "[adaptive]";
+  return {
+      "adaptive resolution",
+      "when parts become finer and coarser, with resolution = \"adaptive\" in [run]",
+      "timed runs",
+      "cells",
+      {{a, "parts", K::list, {}, "\"all\"", "names of parts that may change"},
+       {a, "strain_jump", K::number, {}, "0.002", "difference of the strain of two cells that makes finer"},
+       {a, "calm", K::number, {}, "0.25", "share of strain_jump under which a part is calm; at most 0.5"},
+       {a, "contact", K::flag, {}, "true", "whether what touches a part, or is about to, makes it finer"},
+       {a, "least_time", K::quantity, D::time, "time / 20", "that a part is calm before it becomes coarser"},
+       {a, "finest", K::whole_number, {}, "1", "halvings of the spacing at most, from the start; to 4"},
+       {a, "coarsest", K::whole_number, {}, "0", "doublings of the spacing at most, from the start; to 4"},
+       {a,
+        "max_elements",
+        K::whole_number,
+        {},
+        "--max-elements",
+        "of the body, beyond which nothing is finer"}}};
 }
 
 const char* name_of(ActsIn acts) {
@@ -170,6 +193,7 @@ std::vector<SceneKeyGroup> scene_key_groups() {
   for (const EffectRow& row : effect_rows())
     groups.push_back({row.name, row.help, name_of(row.acts), row.models, row.keys});
   groups.push_back(event_keys());
+  groups.push_back(adaptive_keys());
   return groups;
 }
 

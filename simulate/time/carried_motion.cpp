@@ -9,13 +9,12 @@
 #include "base/error.h"
 #include "base/math/dense.h"
 #include "base/math/small_matrices.h"
+#include "simulate/events/lattice_resolution.h"
 #include "simulate/matter/masses.h"
-#include "simulate/models/cells.h"
 
 namespace flexel::simulate {
 namespace {
 
-constexpr double kEnergyWarned = 0.01;      // change of the energy
 constexpr double kKineticRounding = 1e-12;  // of all kinetic energy: less than that is rounding
 
 PartMomenta momenta_of(const Body& body, const Part& part, const State& state,
@@ -27,20 +26,6 @@ PartMomenta momenta_of(const Body& body, const Part& part, const State& state,
     sum.angular += (body.rest[e] + state.displacement[e]).cross(momentum);
   }
   return sum;
-}
-
-// J: elastic, and kinetic but of the motion of all as one; all kinetic.
-std::array<double, 2> internal_and_kinetic(const Problem& problem, const State& state,
-                                           const std::vector<double>& mass) {
-  Vec3 momentum = Vec3::Zero();
-  double all = 0, kinetic = 0;
-  for (std::size_t e = 0; e < mass.size(); ++e) {
-    momentum += mass[e] * state.velocity[e];
-    kinetic += 0.5 * mass[e] * state.velocity[e].squaredNorm();
-    all += mass[e];
-  }
-  const Stencil none;
-  return {Cells(problem, none).energy(state) + kinetic - 0.5 * momentum.squaredNorm() / all, kinetic};
 }
 
 // Rigid motions of what is held nowhere.
@@ -89,11 +74,11 @@ class FreeMotions {
 
 }  // namespace
 
-CarriedMotion::CarriedMotion(const Problem& problem, const State& state) {
+CarriedMotion::CarriedMotion(const Problem& problem, const State& state, double stored) {
   const std::vector<double> mass = lumped_masses(problem);
   for (const Part& part : problem.body.parts) momenta_.push_back(momenta_of(problem.body, part, state, mass));
-  const auto [internal, kinetic] = internal_and_kinetic(problem, state, mass);
-  internal_ = internal;
+  const auto [internal, kinetic] = internal_and_kinetic(problem, state);
+  internal_ = internal + stored;
   kinetic_ = kinetic;
 }
 
@@ -112,9 +97,10 @@ void CarriedMotion::give_back(const Problem& problem, const std::vector<std::uin
   }
 }
 
-std::string CarriedMotion::change_of_energy(const Problem& problem, const State& state,
-                                            const std::string& origin, Progress& progress) const {
-  const double now = internal_and_kinetic(problem, state, lumped_masses(problem))[0];
+std::string CarriedMotion::change_of_energy(const Problem& problem, const State& state, double stored,
+                                            double borne, const std::string& origin,
+                                            Progress& progress) const {
+  const double now = internal_and_kinetic(problem, state)[0] + stored;
   if (!std::isfinite(now))
     throw DivergedError(
         fmt::format("{}: on the new lattice a cell is folded: change the resolution where the "
@@ -122,7 +108,7 @@ std::string CarriedMotion::change_of_energy(const Problem& problem, const State&
                     origin));
   if (!(internal_ > kKineticRounding * kinetic_)) return "";
   const double change = now / internal_ - 1;
-  if (std::abs(change) > kEnergyWarned)
+  if (std::abs(change) > borne)
     progress.warn(
         fmt::format("{}: the energy of the body changed by {:+.2g} % with its lattice: what it does "
                     "takes smaller cells",

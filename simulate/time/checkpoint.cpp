@@ -27,7 +27,7 @@ namespace flexel::simulate {
 namespace {
 
 constexpr char kMagic[8] = {'f', 'l', 'e', 'x', 'e', 'l', 'C', 'P'};
-constexpr std::uint64_t kVersion = 9;
+constexpr std::uint64_t kVersion = 10;
 
 struct Head {
   char magic[8];
@@ -58,10 +58,10 @@ static void visit(Archive& archive, Checkpoint& c) {
             c.state.kick, c.clock, c.memory.cells.fill, c.memory.cells.plastic, c.memory.cells.springs,
             c.memory.cells.spring_flow, c.memory.connections.flowed, c.memory.connections.strain,
             c.memory.connections.broken, c.memory.reach, c.memory.supports, c.events, c.settled, c.fused,
-            c.memory.effects, c.balance.accounts, c.balance.rows, c.balance.probes, c.balance.columns,
-            c.balance.start, c.balance.changed, c.balance.worst_residual, c.balance.unstored,
-            c.balance.unstored_now, c.balance.worst_unstored, c.balance.largest_term, c.next_row,
-            c.next_frame, c.frames.times, c.frames.surface_frame, c.frames.surface_parts);
+            c.memory.effects, c.adaptive, c.balance.accounts, c.balance.rows, c.balance.probes,
+            c.balance.columns, c.balance.start, c.balance.changed, c.balance.worst_residual,
+            c.balance.unstored, c.balance.unstored_now, c.balance.worst_unstored, c.balance.largest_term,
+            c.next_row, c.next_frame, c.frames.times, c.frames.surface_frame, c.frames.surface_parts);
 }
 
 void write_checkpoint(const Checkpoint& checkpoint, const Bytes& body, const std::string& path) {

@@ -24,6 +24,7 @@ struct Checkpoint {
   std::uint64_t events = 0;       // that have happened
   std::vector<Vec3> settled;      // of SegmentStart, as are
   std::vector<FusedPoint> fused;  // these
+  std::vector<double> adaptive;   // of AdaptiveResolution; empty: lattices stay as they are
   EnergyBalance balance;
   double next_row = 0, next_frame = 0;  // s
   SeriesPlace frames;                   // of the series so far

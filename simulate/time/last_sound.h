@@ -22,6 +22,7 @@ class LastSound {
       }
     });
   }
+  [[nodiscard]] double time() const { return time_; }  // s
   [[nodiscard]] bool empty() const { return values_.empty(); }
   [[nodiscard]] State state() const {
     State state;

@@ -260,6 +260,19 @@ bool TimeSegment::is_fast(const Clock& clock, int steps) const {
   return bound_->travel(state_, steps * clock.step) >= kFast;
 }
 
+std::vector<PartTouch> TimeSegment::touches(double ahead) {
+  std::vector<PartTouch> touches(body_.parts.size());
+  for (const ActiveEffect& effect : effects_) effect->add_touches(state_, ahead, touches);
+  return touches;
+}
+
+double TimeSegment::stored() {
+  double sum = 0;
+  for (const ActiveEffect& effect : effects_)
+    if (effect->account() == EnergyAccount::stored) sum += effect->energy(state_);
+  return sum;
+}
+
 bool TimeSegment::needs_step_recheck() const {
   if (guard_ && guard_->needs_step_recheck()) return true;
   return std::any_of(effects_.begin(), effects_.end(),

@@ -56,7 +56,9 @@ class TimeSegment {
   // Chooses the length of the steps from here to clock.until. Throws DivergedError: it has fallen to nothing;
   // InputError: at the first step, where the scene's step is above the stable one.
   void choose_step(Clock& clock);
-  // Looks at the present state. Throws DivergedError: it is folded, not finite or far beyond what any scene
+  // Looks at the present state for choose_step(), which does so itself. Throws InputError: what has joined overlaps.
+  void look();
+  // Likewise. Throws DivergedError: it is folded, not finite or far beyond what any scene
   // means.
   void refuse_unsound();
   // Chooses anew where the length does not suit what was last looked at.
@@ -120,6 +122,11 @@ class TimeSegment {
   void report(const Clock& clock, bool stress, SimulateResult& result);
 
   [[nodiscard]] const State& state() const { return state_; }
+  [[nodiscard]] const Problem& problem() const { return problem_; }
+  // (parts) what touches them, or may within `ahead` s; not before choose_step().
+  [[nodiscard]] std::vector<PartTouch> touches(double ahead);
+  // J, in effects that store what their forces do.
+  [[nodiscard]] double stored();
   [[nodiscard]] const std::vector<ActiveEffect>& effects() const { return effects_; }
   [[nodiscard]] const Stepper& stepper() const { return *stepper_; }
   [[nodiscard]] bool damps() const;  // internally
@@ -147,7 +154,6 @@ class TimeSegment {
   void tell_forces(SimulateResult& result, const State& state) const;
   void step_and_take_back(const Clock& clock, EnergyHistory* history,
                           const std::function<void(const State&)>& tell);
-  void look();
   void tell_loop_apart();
   template <class Add>
   void add_apart(std::vector<Vec3>* own, const Add& add);

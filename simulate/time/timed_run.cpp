@@ -9,6 +9,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include "base/error.h"
@@ -21,8 +22,10 @@
 #include "formats/lattice/fused_points.h"
 #include "simulate/contact/pairs/stuck_places.h"
 #include "simulate/effects/contact.h"
+#include "simulate/events/adaptive_resolution.h"
 #include "simulate/events/edit.h"
 #include "simulate/events/joined_bonds.h"
+#include "simulate/events/lattice_resolution.h"
 #include "simulate/events/repeated_events.h"
 #include "simulate/events/resolution.h"
 #include "simulate/live/live_link.h"
@@ -45,6 +48,8 @@ namespace {
 
 constexpr int kCheck = 100;  // steps between checks; implicit ones are checked one by one
 constexpr int kFastCheck = 25;
+// Steps between looks at what resolution parts want; with contact in a fast motion
+constexpr int kLook = 25, kTouchLook = 5;
 constexpr std::size_t kRows = 1000;  // of the history, unless the scene says otherwise
 constexpr std::size_t kFrames = 50;  // likewise
 constexpr double kSameTime = 1e-12;  // share of a time
@@ -69,9 +74,15 @@ class TimedRun {
   void play_until(double end, bool resumed);
   void enter_half_step();
   void look_beyond_end();
-  void apply(std::size_t end);
+  [[nodiscard]] bool is_due() const;
+  [[nodiscard]] bool looks() const;
+  [[nodiscard]] bool wants_change();
+  EnergyBalance end_act();
+  void apply(std::span<const Event> happening);
+  void happen(std::span<const Event> happening);
   void bond_joined(std::size_t first, const State& state);
-  void keep_motion(const CarriedMotion& carried, const Event& event);
+  void keep_motion(const CarriedMotion& carried, const Event& event, const std::vector<PartTouch>& touches,
+                   const std::vector<Part>& before);
   [[nodiscard]] std::vector<std::string> warnings_of_effects() const;
   void warn_of_effects(const std::vector<std::string>& told = {});  // but for what is told
   void check();
@@ -105,9 +116,12 @@ class TimedRun {
   std::chrono::steady_clock::time_point saved_ = began_;
   std::size_t events_ = 0;  // that have happened
   RepeatedEvents repeated_;
-  std::size_t frames_ = 0;      // so far
+  std::optional<AdaptiveResolution> adaptive_;
   bool at_whole_step_ = false;  // velocities are of the time of the state, after an event
-  double next_row_ = 0, next_frame_ = 0;
+  struct {
+    double row = 0, frame = 0;  // s, the next ones
+    std::size_t frames = 0;     // so far
+  } due_;
   std::optional<LiveSummary> live_summary_;
 };
 
@@ -128,6 +142,7 @@ TimedRun::TimedRun(Body& body, const Scene& scene, const SimulateOptions& option
                     "something else is not out at its end",
                     contact.parting, duration_));
   if (!options.resume) rehearse_resolution(body, scene_, LiveLink::wanted(scene_, options));
+  if (scene.run.adaptive) adaptive_.emplace(*scene.run.adaptive, body, duration_);
   start_.settled = settled_displacement(body);
   start_.fused = fused_points(body);
   if (!options.series.empty()) series_.emplace(options.series, options.compress);
@@ -194,10 +209,11 @@ void TimedRun::resume(const Checkpoint& from) {
   events_ = std::min<std::size_t>(from.events, scene_.events.size());
   segment_.emplace(body_, scene_, options_, progress_, start_, from.state);
   segment_->restore(from.memory);
+  if (adaptive_) adaptive_->restore(from.adaptive);
   if (series_) series_->resume(from.frames);
-  next_row_ = from.next_row;
-  next_frame_ = from.next_frame;
-  frames_ = from.frames.times.size();
+  due_.row = from.next_row;
+  due_.frame = from.next_frame;
+  due_.frames = from.frames.times.size();
   warn_of_effects();
 }
 
@@ -217,10 +233,11 @@ void TimedRun::keep() {
   kept_->events = events_;
   kept_->settled = start_.settled;
   kept_->fused = start_.fused;
+  if (adaptive_) kept_->adaptive = adaptive_->memory();
   if (history_) kept_->balance = history_->balance();
   if (series_) kept_->frames = series_->place();
-  kept_->next_row = next_row_;
-  kept_->next_frame = next_frame_;
+  kept_->next_row = due_.row;
+  kept_->next_frame = due_.frame;
 }
 
 bool TimedRun::save_checkpoint() {
@@ -269,9 +286,9 @@ void TimedRun::advance(bool row) {
 }
 
 void TimedRun::step() {
-  const bool due = history_ && *segment_->state().time >= next_row_;
+  const bool due = history_ && *segment_->state().time >= due_.row;
   const bool row = due || (history_ && history_->balance().changed);
-  if (due) next_row_ += scene_.run.history_every.value_or(duration_ / kRows);
+  if (due) due_.row += scene_.run.history_every.value_or(duration_ / kRows);
   if (live_) live_->await(clock_.epoch + static_cast<double>(clock_.in_epoch + 1) * clock_.step);
   if (relaxation_) relaxation_->before(segment_->state());
   advance(row);
@@ -292,12 +309,12 @@ void TimedRun::write_frame() {
     }
   if (options_.on_frame) options_.on_frame(body_, *segment_->state().time);
   segment_->unload();
-  next_frame_ = duration_ * static_cast<double>(++frames_) / scene_.run.frames.value_or(kFrames);
+  due_.frame = duration_ * static_cast<double>(++due_.frames) / scene_.run.frames.value_or(kFrames);
 }
 
 // Without an act an event is happening.
 double TimedRun::now() const {
-  return segment_ ? *segment_->state().time : scene_.events[std::min(events_, scene_.events.size() - 1)].at;
+  return segment_ ? *segment_->state().time : sound_.time();
 }
 
 // Leaves the body at `state` (nothing: none was sound), and in the file for runs that end early; says where
@@ -336,31 +353,52 @@ void TimedRun::enter_half_step() {
   if (segment_->kicks()) segment_->kick(-0.5 * clock_.step);
 }
 
-// From the beginning of an act to its end, or from where a checkpoint has it to there.
+// These two of state and clock alone: a run that is resumed checks and looks at the same steps.
+bool TimedRun::is_due() const {
+  return segment_->is_implicit() || clock_.steps % kCheck == 0 ||
+         (clock_.steps % kFastCheck == 0 && segment_->is_fast(clock_, kCheck));
+}
+
+bool TimedRun::looks() const {
+  if (!adaptive_) return false;
+  return segment_->is_implicit() || clock_.steps % kLook == 0 ||
+         (clock_.steps % kTouchLook == 0 && scene_.get<Contact>().on && segment_->is_fast(clock_, kLook));
+}
+
+// Surfaces that may touch before the next look count.
+bool TimedRun::wants_change() {
+  const int steps = segment_->is_implicit() ? 1 : segment_->is_fast(clock_, kLook) ? kTouchLook : kLook;
+  const std::vector<PartTouch> touches = segment_->touches(steps * clock_.step);
+  if (!adaptive_->look(segment_->problem(), segment_->state(), touches, progress_)) return false;
+  segment_->refuse_unsound();
+  return true;
+}
+
+// From the beginning of an act to its end, or from where a checkpoint has it to there; or to where a part changes its
+// resolution.
 void TimedRun::play_until(double end, bool resumed) {
   const auto goes_on = [&] { return *segment_->state().time < end * (1 - kSameTime) && !over(); };
   const bool first = clock_.steps == 0 && goes_on() && !resumed;
   clock_.until = end;
   if (goes_on() && !resumed) segment_->choose_step(clock_);
+  if (clock_.steps == 0 && goes_on() && !resumed && looks() && wants_change()) return;
   if (goes_on() && at_whole_step_) enter_half_step();
-  if ((first || resumed) && options_.explain) segment_->explain(clock_);
+  if ((first || resumed) && options_.explain) {
+    segment_->explain(clock_);
+    if (adaptive_) progress_.say("plan: " + adaptive_->plan());
+  }
   if (first) write_frame();
   if (live_ && (first || resumed)) live_->start(segment_->state());
   if (kept_) keep();
   sound_.keep(segment_->state());
   if (!history_ && !relaxation_) segment_->spare_mass();
   segment_->unload();
-  const bool implicit = segment_->is_implicit();
-  // of state and clock alone: a run that is resumed checks at the same steps
-  const auto is_due = [&] {
-    return implicit || clock_.steps % kCheck == 0 ||
-           (clock_.steps % kFastCheck == 0 && segment_->is_fast(clock_, kCheck));
-  };
   while (goes_on()) {
     if (is_due() || segment_->needs_step_recheck() || stop_is_due()) check();
+    if (looks() && wants_change()) return;
     segment_->renew_damping(clock_);
     step();
-    if (has_frames() && *segment_->state().time >= next_frame_ * (1 - 1e-9)) write_frame();
+    if (has_frames() && *segment_->state().time >= due_.frame * (1 - 1e-9)) write_frame();
   }
   segment_
       ->refuse_unsound();  // a step looks at the state that it begins with: nothing has looked at the last
@@ -397,9 +435,12 @@ void TimedRun::bond_joined(std::size_t first, const State& state) {
     progress_.say(fmt::format("what came is bonded where it touches, in {} points", bonds.size()));
 }
 
-// The lattice is another one since `event`.
-void TimedRun::keep_motion(const CarriedMotion& carried, const Event& event) {
+// The lattices of some parts are others since `event`; what touched them before, and what they were.
+void TimedRun::keep_motion(const CarriedMotion& carried, const Event& event,
+                           const std::vector<PartTouch>& touches, const std::vector<Part>& before) {
   constexpr double kOff = 0.01;  // of the smallest spacing
+  constexpr double kPressed =
+      0.2;  // spacings; surfaces that are a little deeper do not feel each other any more
   double spacing = std::numeric_limits<double>::infinity();
   for (const Part& part : body_.parts) spacing = std::min(spacing, part.lattice.spacing.minCoeff());
   // A box that ends between elements may hold others now, which were free and have moved. A face that lay
@@ -410,17 +451,28 @@ void TimedRun::keep_motion(const CarriedMotion& carried, const Event& event) {
         fmt::format("resolution: on the new lattice a [[fix]] or [[move]] holds elements that were free "
                     "and are {} off: let it name a face, or a box that ends at elements of both lattices",
                     human_length(off)));
+  for (std::size_t p = 0; p < touches.size(); ++p) {
+    const Vec3& now = body_.parts[p].lattice.spacing;
+    if (now == before[p].lattice.spacing || !(touches[p].gap < -kPressed * now.minCoeff())) continue;
+    throw InputError(
+        event.origin,
+        fmt::format("resolution: part \"{}\" is pressed by {}, too much for its new lattice: change it "
+                    "before it touches, or after",
+                    before[p].name, human_length(-touches[p].gap)));
+  }
   segment_->put_on_path();
   const Problem problem = timed_problem(body_, scene_, start_);
   segment_->change_velocities(
       [&](State& state) { carried.give_back(problem, segment_->constraints().mask, state); });
-  const std::string what = carried.change_of_energy(problem, segment_->state(), event.origin, progress_);
+  const double stored = touches.empty() ? 0 : segment_->stored();
+  const std::string what = carried.change_of_energy(
+      problem, segment_->state(), stored, adaptive_ ? adaptive_->energy_borne() : kLargestEnergyChange,
+      event.origin, progress_);
   if (!what.empty()) progress_.say(fmt::format("at {:.4g} s {}", event.at, what));
 }
 
-// Events up to `end` happen now, and another act begins.
-void TimedRun::apply(std::size_t end) {
-  const StopWaits whole;  // between two acts there is no state to save
+// Books, velocities and the body are those of the time at which the act ends.
+EnergyBalance TimedRun::end_act() {
   EnergyBalance balance;
   if (history_) {
     if (clock_.steps > 0) segment_->close_books(clock_, *history_);
@@ -431,31 +483,68 @@ void TimedRun::apply(std::size_t end) {
   const bool was_whole = std::exchange(at_whole_step_, clock_.steps > 0 && segment_->kicks());
   if (at_whole_step_ && !was_whole) segment_->kick(0.5 * clock_.previous);
   segment_->store(segment_->state());
+  sound_.keep(segment_->state());
   segment_->add_effort(result_, options_.explain);
   start_.transferred_states = segment_->transferred_states();
   start_.fused = segment_->fused();
-  State state = segment_->state();
   start_.fresh = false;
+  return balance;
+}
+
+// These events happen now, and another act begins. Where one of them, or what acts after them, is impossible, the body
+// stays as it was before them.
+void TimedRun::apply(std::span<const Event> happening) {
+  const StopWaits whole;  // between two acts there is no state to save
+  EnergyBalance balance = end_act();
+  const Body before = body_;
+  const std::vector<FusedPoint> fused = start_.fused;
+  const auto undo = [&] {
+    segment_.reset();
+    body_ = before;
+    start_.fused = fused;
+    if (options_.history.empty()) return;
+    attempt("history", [&] { write_text(balance.csv(), options_.history, true); });
+  };
+  try {
+    happen(happening);
+  } catch (const DivergedError&) {
+    undo();
+    throw;
+  } catch (const InputError& error) {
+    if (clock_.steps == 0) throw;
+    undo();
+    throw DivergedError(error.where().empty() ? error.what()
+                                              : fmt::format("{}: {}", error.where(), error.what()));
+  }
+  sound_.keep(segment_->state());  // of the elements that there are now
+  segment_->set_hear([this](const std::string& note) { listen(note); });
+  if (!options_.history.empty()) history_ = segment_->make_history(std::move(balance));
+}
+
+void TimedRun::happen(std::span<const Event> happening) {
+  State state = segment_->state();
+  const Event* resolution = nullptr;  // that changes in these events
+  for (const Event& event : happening)
+    if (event.name == ResolutionEvent::name) resolution = &event;
+  std::optional<CarriedMotion> carried;
+  // Before the first look at contacts nothing has been refused that overlaps.
+  const bool looked = resolution && (clock_.steps > 0 || adaptive_);
+  const std::vector<PartTouch> touches = looked ? segment_->touches(0) : std::vector<PartTouch>();
+  if (resolution) carried.emplace(segment_->problem(), state, looked ? segment_->stored() : 0);
   const std::vector<std::string> told = warnings_of_effects();
   segment_.reset();
-  const Event* resolution = nullptr;  // that changes in these events
-  for (std::size_t n = events_; n < end; ++n)
-    if (scene_.events[n].name == ResolutionEvent::name) resolution = &scene_.events[n];
-  std::optional<CarriedMotion> carried;
-  if (resolution) carried.emplace(timed_problem(body_, scene_, start_), state);
   const bool was_edited = edits_damping(body_);
-  const std::size_t parts = body_.parts.size();
+  const std::vector<Part> parts = body_.parts;
   body_.notes.erase(kFusedNote);  // events change start_.fused and the numbers of elements
   body_.notes.erase(kStuckNote);  // in the transferred states
-  for (; events_ < end; ++events_) {
-    const Event& event = scene_.events[events_];
+  for (const Event& event : happening) {
     const Problem problem = timed_problem(body_, scene_, start_);
     EventContext context{body_,   state,     start_.fused, start_.settled,
                          problem, progress_, event.turn,   event.turns};
     const std::string what = repeated_.apply(event, context);
     if (!what.empty()) progress_.say(fmt::format("at {:.4g} s {}: {}", event.at, event.name, what));
   }
-  bond_joined(parts, state);
+  bond_joined(parts.size(), state);
   for (auto& [name, transferred] : start_.transferred_states)
     if (name == Contact::name)
       for (const StuckPlaces& came : stuck_places(body_))  // with bodies that were added
@@ -465,13 +554,11 @@ void TimedRun::apply(std::size_t end) {
     act_body_ = body_bytes(body_);
   }
   segment_.emplace(body_, scene_, options_, progress_, start_, std::move(state));
-  sound_.keep(segment_->state());  // of the elements that there are now
-  if (carried) keep_motion(*carried, *resolution);
-  if (body_.parts.size() > parts) warn_of_effects(told);
+  if (carried) keep_motion(*carried, *resolution, touches, parts);
+  segment_->look();  // an act that cannot begin is found out here
+  if (body_.parts.size() > parts.size()) warn_of_effects(told);
   if (!was_edited && edits_damping(body_) && !segment_->damps())
     progress_.warn("edit: the scene has no [damping] that \"damping\" could change");
-  segment_->set_hear([this](const std::string& note) { listen(note); });
-  if (!options_.history.empty()) history_ = segment_->make_history(std::move(balance));
 }
 
 void TimedRun::play() {
@@ -483,10 +570,17 @@ void TimedRun::play() {
     while (end < scene_.events.size() && at >= scene_.events[end].at * (1 - kSameTime)) ++end;
     play_until(at, std::exchange(resumed, false));
     if (over()) break;
-    apply(end);
+    apply(std::span(scene_.events).subspan(events_, end - events_));
+    events_ = end;
   }
   const std::uint64_t before = clock_.steps;
   play_until(duration_, resumed);
+  while (adaptive_) {
+    const std::vector<Event> changes = adaptive_->take_due();
+    if (changes.empty()) break;
+    apply(changes);
+    play_until(duration_, false);
+  }
   const bool steps = clock_.steps > before || over();
   if (relaxation_ && !relaxation_->done())
     throw DivergedError(relaxation_->failure(body_, segment_->state()));

@@ -1,6 +1,7 @@
 """Events of timed runs from the outside: what a chain of programs gets, and what is refused."""
 
 import json
+import os
 
 from harness import body, expect, expect_error, expect_ok, expect_only, main, run, scene, write
 from shapes import binary_stl, box_triangles
@@ -96,18 +97,42 @@ def test_fused_parts_stay_fused_in_later_runs():
 def test_refusals():
     body()
     for text, fragments in (
-        (FREE + CARVE.format("-1 mm"), ("carve", "nothing", "scene.toml:")),
         (FREE + '[[event]]\nat = "3 ms"\ndo = "renormalise"\n', ("scene.toml:6", "0.003 s", "0.002 s")),
         (FREE + '[[event]]\nat = "1 ms"\ndo = "explode"\n', ("scene.toml:", "explode", "renormalise")),
         (FREE + '[[event]]\nat = "1 ms"\ndo = "edit"\nstiffness = -2\n', ("scene.toml:", "stiffness")),
         (FREE + '[[event]]\nat = "1 ms"\ndo = "edit"\nstifness = 2\n', ("scene.toml:", "stiffness")),
         (FREE + '[[event]]\nat = "1 ms"\ndo = "add"\nbody = "missing.vtu"\n', ("missing.vtu",)),
-        (FREE + '[[event]]\nat = "1 ms"\ndo = "fuse"\nwithin = "1 mm"\n', ("fuse", "nothing")),
         (PULLED + '[[event]]\nat = "1 ms"\ndo = "renormalise"\n', ("event", "time")),
     ):
         scene(text=text)
         expect_error(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu"), "flexel-simulate", *fragments)
         expect_only("body.vtu", "scene.toml")
+
+
+def test_what_an_event_makes_impossible_ends_the_run_with_its_state():
+    """Exit code 3, and the state before the event, which is that of a run that ends there; at the start exit code 2, and nothing."""
+    body()
+    load = FREE + '[[load]]\nwhere = "xmax"\nforce = ["1 N", 0, 0]\n'
+    scene("until.toml", load.replace('time = "2 ms"', 'time = "1 ms"'))
+    expect_ok(run("flexel-simulate", "until.toml", "body.vtu", "-o", "until.vtu"))
+    expect_ok(run("flexel-map", "until.vtu", "-o", "until.obj"))
+    for text, fragments in (
+        (load + CARVE.format("19 mm"), ("scene.toml:", "xmax")),
+        (load + CARVE.format("-1 mm"), ("scene.toml:", "carve", "nothing")),
+        (load + '[[event]]\nat = "1 ms"\ndo = "fuse"\nwithin = "1 mm"\n', ("scene.toml:", "fuse", "nothing")),
+    ):
+        scene(text=text)
+        expect_error(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu"), "flexel-simulate", "0.001 s", "out.failed.vtu", *fragments, code=3)
+        expect_only("body.vtu", "scene.toml", "until.toml", "until.vtu", "until.obj", "out.failed.vtu")
+        expect_ok(run("flexel-map", "out.failed.vtu", "-o", "failed.obj"))
+        left, right = ([float(x) for line in open(name) if line.startswith("v ") for x in line.split()[1:]] for name in ("failed.obj", "until.obj"))
+        expect(len(left) == len(right) and max(abs(a - b) for a, b in zip(left, right)) < 1e-4, f"another state: {left}, {right}")
+        expect(max(left) > 40.05, "it has not moved yet")
+        os.remove("failed.obj")
+        os.remove("out.failed.vtu")
+        scene(text=text.replace('at = "1 ms"', 'at = "0 ms"'))
+        expect_error(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu"), "flexel-simulate", *fragments)
+        expect_only("body.vtu", "scene.toml", "until.toml", "until.vtu", "until.obj")
 
 
 def test_a_rigid_part_of_edited_density_turns_as_a_stiff_one():

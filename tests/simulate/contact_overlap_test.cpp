@@ -234,7 +234,7 @@ TEST(Contact, APartThatJoinsInsideAnotherIsRefusedOrLetOut) {
   const auto refusal = [&](double depth, double parting) {
     try {
       (void)run(depth, parting);
-    } catch (const InputError& error) {
+    } catch (const DivergedError& error) {
       return std::string(error.what());
     }
     return std::string();

@@ -224,7 +224,7 @@ TEST(Events, CarvingEverythingIsRefused) {
                                          "do = \"carve\"\nwhere = { sphere = { centre = [\"0 mm\", 0, 0], "
                                          "radius = \"1 m\" } }")));
     FAIL() << "accepted";
-  } catch (const InputError& error) {
+  } catch (const DivergedError& error) {
     EXPECT_THAT(error.what(), HasSubstr("leaves nothing of part \"bar\""));
   }
 }

@@ -144,7 +144,7 @@ TEST(RepeatedEvents, WhatChangesNoCellIsRefusedOrPassedOver) {
     try {
       (void)run_scene(scene_with("[[event]]\nat = \"1 ms\"\n" + small));
       ADD_FAILURE() << "accepted: " << what;
-    } catch (const InputError& error) {
+    } catch (const DivergedError& error) {
       EXPECT_THAT(error.what(), HasSubstr("no cell has more than half of its elements in sphere"));
     }
     const testing::TimedCase made =
@@ -219,7 +219,7 @@ TEST(RepeatedEvents, OneOfAListThatHoldsNothingIsNotPassedOver) {
       (void)run_scene(
           scene_with("[[event]]\nat = \"1 ms\"\nevery = \"1 ms\"\ndo = \"carve\"\nwhere = " + where + "\n"));
       ADD_FAILURE() << "accepted: " << where;
-    } catch (const InputError& error) {
+    } catch (const DivergedError& error) {
       EXPECT_THAT(error.what(), HasSubstr("each needs to hold something"));
     }
 }
@@ -229,6 +229,8 @@ TEST(RepeatedEvents, WrongEntriesAreRefused) {
     try {
       (void)run_scene(scene_with("[[event]]\n" + event));
     } catch (const InputError& error) {
+      return error.what();
+    } catch (const DivergedError& error) {
       return error.what();
     }
     return "";

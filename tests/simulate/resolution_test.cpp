@@ -353,7 +353,10 @@ TEST(Resolution, Refuses) {
   EXPECT_THAT(refused(change_at("1 ms", "\"finer\"\npart = \"bat\"")),
               ::testing::HasSubstr("did you mean \"bar\""));
   EXPECT_THAT(refused(change_at("1 ms", "\"finer\"\nevery = \"1 ms\"")), ::testing::HasSubstr("\"every\""));
-  EXPECT_THAT(refused(finer, "contact = true\n"), ::testing::HasSubstr("contact"));
+  EXPECT_EQ(refused(finer, "[contact]\nself = false\n"), "accepted");
+  EXPECT_THAT(refused(finer, "[contact]\nstick = \"1 kPa\"\n"), ::testing::HasSubstr("sticks"));
+  EXPECT_THAT(refused(finer, "[contact]\noverlap = \"part\"\noverlap_time = \"1 ms\"\n"),
+              ::testing::HasSubstr("overlap"));
   EXPECT_THAT(refused(finer, "[plasticity]\nyield = \"1 kPa\"\n"), ::testing::HasSubstr("plasticity"));
   EXPECT_THAT(refused(finer, "[fracture]\nstrength = \"1 kPa\"\n"), ::testing::HasSubstr("fracture"));
   EXPECT_THAT(refused(finer, "[parts.bar]\nmodel = \"springs\"\n"), ::testing::HasSubstr("springs"));
@@ -372,7 +375,7 @@ where = { box = { min = ["-1 mm", "-1 mm", "-1 mm"], max = ["6 mm", "21 mm", "21
   try {
     (void)run_timed(thrown_bar(1, 0), changing_scene(change_at("1 ms", "\"finer\""), fix));
     FAIL();
-  } catch (const InputError& error) {
+  } catch (const DivergedError& error) {
     EXPECT_THAT(error.what(), ::testing::HasSubstr("were free"));
   }
 }
