@@ -32,6 +32,9 @@ constexpr double kLeastScale = 1e-2;  // of the strongest force so far
 constexpr int kMostSteps = 4, kMostGradients = 8;
 constexpr double kLeastForcing = 0.05, kMostForcing = 0.2;  // of the linear solution
 constexpr double kServes = 0.6;  // a step with a tangent that serves leaves at most this of the residual
+// Likewise where tools push: points come to touch, and cease to, with each step
+constexpr int kMostTouchingSteps = 10, kTouchingGradients = 12, kStepsOfATangent = 6;
+constexpr double kTouchingForcing = 0.1, kArmijo = 1e-4, kShortestStep = 1.0 / 16;
 
 simulate::Problem problem_of(const simulate::Scene& scene, const Body& body,
                              const simulate::Fragments& fragments) {
@@ -190,16 +193,22 @@ bool PulledBody::solve(const std::vector<ToolPose>& poses, double tolerance, int
 }
 
 bool PulledBody::follow(const std::vector<ToolPose>& poses, double tolerance) {
-  if (!memory_.factored || memory_.projected || mechanics_->follows() || pushers_of(tools_) > 0) return false;
+  if (!memory_.factored || memory_.projected || mechanics_->follows()) return false;
+  const simulate::Indenters* indenters = simulate::find_indenters(mechanics_->effects());
+  const std::vector<simulate::IndenterPlace> places =
+      indenters ? indenters->places(state_.share) : std::vector<simulate::IndenterPlace>{};
   lead_ties(poses);
   simulate::State begun = state_;
   answers_.add(way_between(poses_, poses), begun.displacement);
   apply(mechanics_->constraints(), body_, begun, begun.displacement);
   Iterate at = iterate(std::move(begun));
   bool found = at.residual <= tolerance;
-  for (int step = 0; !found && step < kMostSteps && improve(at, tolerance); ++step)
+  const int most = indenters ? kMostTouchingSteps : kMostSteps;
+  for (int step = 0; !found && step < most && (indenters ? touch(at, step) : improve(at, tolerance)); ++step)
     found = at.residual <= tolerance;
-  if (!found || !std::isfinite(mechanics_->energy(at.state))) {
+  if (!found || !std::isfinite(mechanics_->energy(at.state)) ||
+      (indenters && !indenters->gone_through(places, state_.displacement, at.state).empty())) {
+    if (indenters) memory_.model_error = 1;  // the tangent is of nowhere
     lead_ties(poses_);
     return false;
   }
@@ -234,6 +243,31 @@ bool PulledBody::improve(Iterate& at, double tolerance) {
   else
     renew_tangent(at.state);
   return true;
+}
+
+// One step where tools push. What touches changes from step to step, so what the tools add to the tangent is made anew at
+// each, the rest seldom; how far it goes the energy tells, for the forces that are left rise where more points touch.
+bool PulledBody::touch(Iterate& at, int step) {
+  if (!std::isfinite(at.residual)) return false;
+  if (step == kStepsOfATangent || !mechanics_->renew_effects(at.state))
+    renew_tangent(at.state);
+  else
+    memory_.preconditioner->refresh_smoother();
+  memory_.stale = true;
+  std::vector<Vec3> way;
+  const simulate::LinearResult linear =
+      conjugate_gradients(mechanics_->whole_tangent(), at.unbalanced, way, *memory_.preconditioner,
+                          kTouchingForcing, kTouchingGradients);
+  if (linear.indefinite) return false;
+  const double before = mechanics_->energy(at.state), falls = simulate::dot(at.unbalanced, way);
+  for (double share = 1; share >= kShortestStep; share /= 2) {
+    simulate::State moved = at.state;
+    parallel_for_each(way.size(), [&](std::size_t e) { moved.displacement[e] += share * way[e]; });
+    if (!(mechanics_->energy(moved) <= before - kArmijo * share * falls)) continue;
+    at = iterate(std::move(moved));
+    return true;
+  }
+  return false;
 }
 
 void PulledBody::renew_tangent(const simulate::State& state) {

@@ -58,7 +58,7 @@ class PulledBody {
             const std::function<void()>& stop);
 
   // Moves near the equilibrium with tools at `poses`: to a residual of `tolerance`, with the tangent that is there while it serves,
-  // at a fraction of what lead() costs. False, and nothing has changed, where that is not enough, or a tool pushes.
+  // at a fraction of what lead() costs. False, and nothing has changed, where that is not enough.
   bool follow(const std::vector<ToolPose>& poses, double tolerance);
   // Back to where lead() found an equilibrium to kRest last, or where it began.
   void retreat();
@@ -87,6 +87,7 @@ class PulledBody {
   };
   [[nodiscard]] Iterate iterate(simulate::State state);
   [[nodiscard]] bool improve(Iterate& at, double tolerance);
+  [[nodiscard]] bool touch(Iterate& at, int step);
   void renew_tangent(const simulate::State& state);
   void accept(simulate::State state, const std::vector<ToolPose>& poses, double residual);
   void measure(const std::vector<Vec3>& unbalanced);
