@@ -94,9 +94,8 @@ Act ball_act(Act::Kind kind, const std::string& rest, const std::string& place) 
   const bool glues = kind == Act::Kind::glue;
   const std::vector<std::string> words = words_of(rest);
   if (words.size() != (glues ? 6 : 5) || words[0] != "at")
-    throw InputError(place,
-                     glues ? "glue: give \"at X Y Z RADIUS WITHIN\""
-                           : "carve: give \"at X Y Z RADIUS\", \"from X Y Z RADIUS\" or \"to X Y Z\"");
+    throw InputError(place, glues ? "glue: give \"at X Y Z RADIUS WITHIN\""
+                                  : "carve: give \"at X Y Z RADIUS\", \"from X Y Z RADIUS\" or \"to X Y Z\"");
   Act act{kind, "", {}};
   act.at = vector(words, 1, kFarthest, place);
   act.radius = number(words[4], kFarthest, place);

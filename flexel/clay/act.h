@@ -35,8 +35,8 @@ struct Act {
   double radius = 0;       // m, likewise
   bool on = true;          // hold; draw: the ball is put down, else it goes straight on to `way`
   double within = 0;       // m, glue: how near
-  std::string material = {};  // paint
-  Vec3 from = Vec3::Zero();   // push: unit vector, from the part to where the tool comes from
+  std::string material = {};   // paint
+  Vec3 from = Vec3::Zero();    // push: unit vector, from the part to where the tool comes from
   std::vector<Vec3> way = {};  // m, rest: draw
 };
 

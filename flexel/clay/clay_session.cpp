@@ -236,9 +236,10 @@ Answer ClaySession::act(const std::string& message) {
     if (act.kind == Act::Kind::draw && !act.on && !queue_.empty() && takes_more_places(queue_.back().act)) {
       std::vector<Vec3>& way = queue_.back().act.way;
       way.insert(way.end(), act.way.begin(), act.way.end());
+      queue_.back().line = ++line_;
       continue;
     }
-    if (is_motion(act)) ++line_;
+    if (is_motion(act) || act.kind == Act::Kind::draw) ++line_;
     if (is_motion(act) && !queue_.empty() && is_motion(queue_.back().act)) queue_.pop_back();
     queue_.push_back({std::move(act), line_});
   }
@@ -442,7 +443,8 @@ void ClaySession::draw(const Act& act) {
   std::vector<Vec3>& path = carving.ways.back().path;
   path.insert(path.end(), act.way.begin(), act.way.end());
   carving.places += act.way.size();
-  if (carving.places > kMostPlaces) throw InputError("the way has 2,000 places: lift the tool before it goes on");
+  if (carving.places > kMostPlaces)
+    throw InputError("the way has 2,000 places: lift the tool before it goes on");
   if (!draws_on()) carve_drawn();
 }
 

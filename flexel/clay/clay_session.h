@@ -45,11 +45,11 @@ class ClaySession {
 
  private:
   using Clock = std::chrono::steady_clock;
-  struct Carving {                // along the way of the hand
+  struct Carving {                     // along the way of the hand
     std::shared_ptr<const Body> body;  // that it began with
     std::vector<CarvedWay> ways;       // one each time that the ball was put down
-    std::vector<std::uint8_t> holds;  // (ways) whether some element is in it
-    std::size_t places = 0;           // of all ways
+    std::vector<std::uint8_t> holds;   // (ways) whether some element is in it
+    std::size_t places = 0;            // of all ways
     bool changed = false, refused = false;
     std::string nothing;  // why nothing goes so far
   };
@@ -116,7 +116,7 @@ class ClaySession {
   std::condition_variable changed_;
   struct Waiting {
     Act act;
-    std::uint64_t line = 0;  // number of the last pose up to it
+    std::uint64_t line = 0;  // number of the last pose, or place of a way, up to it
   };
   std::deque<Waiting> queue_;
   std::string holder_;

@@ -34,7 +34,7 @@ constexpr double kLeastForcing = 0.05, kMostForcing = 0.2;  // of the linear sol
 constexpr double kServes = 0.6;  // a step with a tangent that serves leaves at most this of the residual
 // Likewise where tools push: points come to touch, and cease to, with each step
 constexpr int kMostTouchingSteps = 10, kTouchingGradients = 12, kStepsOfATangent = 6;
-constexpr double kTouchingForcing = 0.1, kArmijo = 1e-4, kShortestStep = 1.0 / 16;
+constexpr double kTouchingForcing = 0.1, kArmijo = 1e-4, kShortestStep = 1.0 / 16, kFar = 0.3;
 
 simulate::Problem problem_of(const simulate::Scene& scene, const Body& body,
                              const simulate::Fragments& fragments) {
@@ -223,7 +223,8 @@ PulledBody::Iterate PulledBody::iterate(simulate::State state) {
   at.unbalanced = at.forces.total;
   clear_prescribed(mechanics_->constraints(), at.unbalanced);
   const double scale = std::max(at.forces.scale, kLeastScale * strongest_);
-  at.residual = std::sqrt(simulate::dot(at.unbalanced, at.unbalanced)) / scale;
+  at.left = std::sqrt(simulate::dot(at.unbalanced, at.unbalanced));
+  at.residual = at.left / scale;
   return at;
 }
 
@@ -238,7 +239,7 @@ bool PulledBody::improve(Iterate& at, double tolerance) {
   simulate::State moved = at.state;
   parallel_for_each(step.size(), [&](std::size_t e) { moved.displacement[e] += step[e]; });
   Iterate next = iterate(std::move(moved));
-  if (next.residual <= std::max(tolerance, kServes * at.residual))
+  if (next.residual <= tolerance || next.left <= kServes * at.left)
     at = std::move(next);
   else
     renew_tangent(at.state);
@@ -246,7 +247,9 @@ bool PulledBody::improve(Iterate& at, double tolerance) {
 }
 
 // One step where tools push. What touches changes from step to step, so what the tools add to the tangent is made anew at
-// each, the rest seldom; how far it goes the energy tells, for the forces that are left rise where more points touch.
+// each, the rest seldom; how far it goes the energy tells, for the forces that are left rise where more points touch. Forces
+// on points that are hardly inside go by the square of the depth, and Newton's step gets them half the way out: far from the
+// solution twice the step is tried too.
 bool PulledBody::touch(Iterate& at, int step) {
   if (!std::isfinite(at.residual)) return false;
   if (step == kStepsOfATangent || !mechanics_->renew_effects(at.state))
@@ -259,15 +262,20 @@ bool PulledBody::touch(Iterate& at, int step) {
       conjugate_gradients(mechanics_->whole_tangent(), at.unbalanced, way, *memory_.preconditioner,
                           kTouchingForcing, kTouchingGradients);
   if (linear.indefinite) return false;
+  const auto moved = [&](double share) {
+    simulate::State state = at.state;
+    parallel_for_each(way.size(), [&](std::size_t e) { state.displacement[e] += share * way[e]; });
+    return state;
+  };
   const double before = mechanics_->energy(at.state), falls = simulate::dot(at.unbalanced, way);
-  for (double share = 1; share >= kShortestStep; share /= 2) {
-    simulate::State moved = at.state;
-    parallel_for_each(way.size(), [&](std::size_t e) { moved.displacement[e] += share * way[e]; });
-    if (!(mechanics_->energy(moved) <= before - kArmijo * share * falls)) continue;
-    at = iterate(std::move(moved));
-    return true;
+  double share = 1, energy = mechanics_->energy(moved(share));
+  while (!(energy <= before - kArmijo * share * falls)) {
+    if ((share /= 2) < kShortestStep) return false;
+    energy = mechanics_->energy(moved(share));
   }
-  return false;
+  if (share == 1 && at.residual > kFar && mechanics_->energy(moved(2)) < energy) share = 2;
+  at = iterate(moved(share));
+  return true;
 }
 
 void PulledBody::renew_tangent(const simulate::State& state) {

@@ -82,8 +82,8 @@ class PulledBody {
   struct Iterate {
     simulate::State state;
     simulate::Forces forces;
-    std::vector<Vec3> unbalanced;  // (elements) N, on free components
-    double residual = 0;           // relative
+    std::vector<Vec3> unbalanced;   // (elements) N, on free components
+    double left = 0, residual = 0;  // N, their norm; relative
   };
   [[nodiscard]] Iterate iterate(simulate::State state);
   [[nodiscard]] bool improve(Iterate& at, double tolerance);

@@ -55,8 +55,7 @@ Selection parse_table(const SceneValue& value, const TableReader& outer) {
       if ((s.min.array() > s.max.array()).any()) r.fail("box: \"min\" lies above \"max\"");
     }));
   if (const SceneValue* sphere = reader.find("sphere"))
-    found.push_back(
-        parse_shape(Selection::Kind::sphere, *sphere, outer, "sphere", parse_sphere));
+    found.push_back(parse_shape(Selection::Kind::sphere, *sphere, outer, "sphere", parse_sphere));
   if (const SceneValue* half = reader.find("half_space"))
     found.push_back(parse_shape(Selection::Kind::half_space, *half, outer, "half_space",
                                 [](TableReader& r, Selection& s) {

@@ -17,7 +17,8 @@ constexpr const char* kMessage =
     "0.004\n"
     "hand 0 0 -0.005\nhand 0 0 -0.005 0 0.1 0\n0 1e-3 0 0\n0 1e-3 2e-3 0 0 0.1 "
     "0\nstay\nrelease\nkeep\nundo\nredo\n"
-    "material PLA\ncarve at 0.08 0.02 0.003 0.004\ncarve from 0.08 0.02 0.003 0.004\ncarve to 0.07 0.02 0.003\npush ball 0.08 0.02 0.006 0 0 1 0.004\npush plate 0.08 "
+    "material PLA\ncarve at 0.08 0.02 0.003 0.004\ncarve from 0.08 0.02 0.003 0.004\ncarve to 0.07 0.02 "
+    "0.003\npush ball 0.08 0.02 0.006 0 0 1 0.004\npush plate 0.08 "
     "0.02 0.006 0 0 1 0.004\npaint steel bracket\nglue at 0.08 0.02 0.003 0.004 "
     "0.0005\ncancel\ntake\n";
 
