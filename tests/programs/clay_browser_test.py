@@ -212,14 +212,14 @@ def test_a_drag_carves_without_gaps_however_fast_it_is():
         browser.mouse(("move", x, y), ("up",))
         settle(browser)
         browser.run("flexelView.controls.look('top')")
-        browser.choose("ball", "5")
+        browser.choose("ball", "7")
         choose_hand(browser, "carve")
         at = lambda *place: browser.run("return flexelView.clay.worldPoint(arguments[0]).map(Math.round)", list(place))
-        begin, middle, end, beside = at(0.03, 0.012, 0.006), at(0.05, 0.03, 0.006), at(0.07, 0.012, 0.006), at(0.05, 0.08, 0.006)
+        begin, middle, end = at(0.03, 0.012, 0.006), at(0.05, 0.03, 0.006), at(0.07, 0.012, 0.006)
         posted, fast = carve_by_hand(browser, begin, middle, end)
         expect(posted[0].startswith("carve from") and posted[-1] == "stay" and sum(line.startswith("carve from") for line in posted) == 1, f"one way: {posted}")
         places = [[float(number) for number in line.split()[2:5]] for line in posted[:-1]]
-        expect(max(math.dist(a, b) for a, b in zip(places, places[1:])) <= 0.0051 and len(fast) > 20, f"without gaps: {places}")
+        expect(max(math.dist(a, b) for a, b in zip(places, places[1:])) <= 0.0071 and len(fast) > 15, f"without gaps: {len(fast)} {places}")
         frame = browser.run("const {positions, ...frame} = flexelView.clay.frame; return frame")
         expect(not frame["said"] and frame["felt"][0][2] > 0, f"the tool still pulls: {frame['said']} {frame['felt']}")
         expect_drawn_as_saved(browser, url)
@@ -231,11 +231,11 @@ def test_a_drag_carves_without_gaps_however_fast_it_is():
         share = lambda a, b, k: tuple(p + (q - p) * k / 12 for p, q in zip(a, b))
         slow = carve_by_hand(browser, begin, *(share(begin, middle, k) for k in range(1, 13)), *(share(middle, end, k) for k in range(1, 13)))[1]
         odd = set(fast) ^ set(slow)
-        expect(len(odd) <= 0.03 * len(fast), f"a slow hand carves the same: {len(odd)} of {len(fast)}")  # places are whole pixels
+        expect(len(odd) <= 2, f"a slow hand carves the same: {len(odd)} of {len(fast)}")  # places are whole pixels
         browser.keys_with_control("z")
         browser.wait("flexelView.clay.frame.surface === 0")
         # beside the part the ball is lifted, and comes down again: still one act
-        posted, lifted = carve_by_hand(browser, begin, at(0.03, 0.08, 0.006), at(0.07, 0.08, 0.006), end)
+        posted, lifted = carve_by_hand(browser, begin, at(0.03, 0.046, 0.006), at(0.07, 0.046, 0.006), end)
         expect(sum(line.startswith("carve from") for line in posted) == 2 and 0 < len(lifted), f"{posted}")
         browser.keys_with_control("z")
         browser.wait("flexelView.clay.frame.surface === 0")
@@ -248,9 +248,6 @@ def test_a_drag_carves_without_gaps_however_fast_it_is():
             browser.mouse(("move", *end), ("up",))
             settle(browser)
             expect(gone_elements(browser) == [] and not browser.run("return flexelView.clay.frame.said"), "nothing is carved")
-        # all that holds the part cannot go
-        posted, left = carve_by_hand(browser, at(0.006, 0.002, 0.006), at(0.006, 0.039, 0.006), at(0.001, 0.039, 0.006), at(0.001, 0.002, 0.006))
-        expect("carve" in browser.run("return flexelView.clay.frame.said") or browser.run("return flexelView.clay.frame.felt[0][2]") > 0, "it stops, or the part is held still")
         expect_silence(browser)
 
 

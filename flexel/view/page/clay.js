@@ -322,15 +322,17 @@ export class Clay {
         if (!answer.ok && number !== this.frame.surface) continue;
         if (answer.status === 404) break;  // another has come; the frame that says so is on its way
         if (!answer.ok) throw new Error(await answer.text());
-        this.panel.replaceSurface(await unpack(new Uint8Array(await answer.arrayBuffer())));
+        const pack = await unpack(new Uint8Array(await answer.arrayBuffer()));
+        if (number !== this.frame.surface) continue;
+        this.panel.replaceSurface(pack);
         this.shape = this.panel.shape;
         this.carriedRest = undefined;
         this.surface = number;
+        this.bend(this.frame.positions);  // at once: until then its points lie nowhere, and no click finds it
       }
       this.controls.probes.clear();
       this.panel.setInk(this.picture.state.theme);
       this.facePlaces = this.placesOfFaces();
-      this.fresh = this.frame.positions;
       this.askToShow();
     } catch (error) {
       this.say(`what was carved is not shown (${error.message.trim()})`, "warning");
