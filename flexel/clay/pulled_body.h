@@ -87,7 +87,8 @@ class PulledBody {
   };
   [[nodiscard]] Iterate iterate(simulate::State state);
   [[nodiscard]] bool improve(Iterate& at, double tolerance);
-  [[nodiscard]] bool touch(Iterate& at, int step);
+  [[nodiscard]] double touch(Iterate& at, bool renew);
+  [[nodiscard]] bool improve_touching(Iterate& at, double tolerance);
   void renew_tangent(const simulate::State& state);
   void accept(simulate::State state, const std::vector<ToolPose>& poses, double residual);
   void measure(const std::vector<Vec3>& unbalanced);
