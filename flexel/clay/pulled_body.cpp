@@ -34,7 +34,7 @@ constexpr double kLeastForcing = 0.05, kMostForcing = 0.2;  // of the linear sol
 constexpr double kServes = 0.6;  // a step with a tangent that serves leaves at most this of the residual
 // Likewise where tools push: points come to touch, and cease to, with each step
 constexpr int kMostTouchingSteps = 16, kTouchingGradients = 12, kStepsOfATangent = 6;
-constexpr double kTouchingForcing = 0.1, kArmijo = 1e-4, kShortestStep = 1.0 / 16, kFar = 0.3;
+constexpr double kTouchingForcing = 0.1, kArmijo = 1e-4, kShortestStep = 1.0 / 1024, kFar = 0.3;
 
 simulate::Problem problem_of(const simulate::Scene& scene, const Body& body,
                              const simulate::Fragments& fragments) {
@@ -269,7 +269,7 @@ double PulledBody::touch(Iterate& at, bool renew) {
   const double before = mechanics_->energy(at.state), falls = simulate::dot(at.unbalanced, way);
   double share = 1, energy = mechanics_->energy(moved(share));
   while (!(energy <= before - kArmijo * share * falls)) {
-    if ((share /= 2) < kShortestStep) return 0;
+    if ((share /= 4) < kShortestStep) return 0;
     energy = mechanics_->energy(moved(share));
   }
   if (share == 1 && at.residual > kFar && mechanics_->energy(moved(2)) < energy) share = 2;
@@ -277,13 +277,13 @@ double PulledBody::touch(Iterate& at, bool renew) {
   return share;
 }
 
-// A tangent whose steps are too long is of another shape.
+// A tangent none of whose steps serves is of another shape.
 bool PulledBody::improve_touching(Iterate& at, double tolerance) {
   bool renew = false;
   for (int step = 1; at.residual > tolerance && step <= kMostTouchingSteps; ++step) {
     const double share = touch(at, renew || step % kStepsOfATangent == 0);
     if (share == 0 && renew) return false;
-    renew = share < 1;
+    renew = share == 0;
   }
   return at.residual <= tolerance;
 }
