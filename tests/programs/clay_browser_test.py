@@ -376,6 +376,7 @@ def test_parts_are_glued_and_painted():
         browser.run("document.getElementById('face-paint').click()")
         browser.wait("flexelView.clay.frame.painted.low === 'spring-steel'")
         choose_hand(browser, "paint")
+        expect("all of it" in browser.text("hands-said"), "a region is not painted, and the page says so")
         browser.choose("paint-with", "ABS")
         browser.click(*centre_of_face(browser, "high/2"))
         browser.wait("flexelView.clay.frame.painted.high === 'ABS'")

@@ -104,6 +104,7 @@ export class Clay {
     const pushes = name => name.startsWith("push-"), along = this.by("along");
     if (pushes(mode) && along.value === "any") along.value = "in";
     if (!pushes(mode) && along.value === "in") along.value = "any";
+    if (mode === "paint") this.say("A part has one material throughout: a click paints all of it.");
     this.mode = mode;
   }
 
