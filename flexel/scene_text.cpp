@@ -29,6 +29,12 @@ std::string vector(const Vec3& value, const char* unit) {
                      quantity(value.z(), unit));
 }
 
+std::string places(const std::vector<simulate::Selection>& path) {
+  std::string text;
+  for (const simulate::Selection& each : path) text += (text.empty() ? "" : ", ") + vector(each.point, "m");
+  return "[" + text + "]";
+}
+
 std::string direction_text(const Vec3& value) {
   return fmt::format("[{:.17g}, {:.17g}, {:.17g}]", value.x(), value.y(), value.z());
 }
@@ -41,6 +47,9 @@ std::string where_text(const simulate::Selection& selection) {
       return fmt::format("{{ box = {{ min = {}, max = {} }} }}", vector(selection.min, "m"),
                          vector(selection.max, "m"));
     case simulate::Selection::Kind::sphere:
+      if (!selection.members.empty())
+        return fmt::format("{{ sphere = {{ path = {}, radius = {} }} }}", places(selection.members),
+                           quantity(selection.radius, "m"));
       return fmt::format("{{ sphere = {{ centre = {}, radius = {} }} }}", vector(selection.point, "m"),
                          quantity(selection.radius, "m"));
     case simulate::Selection::Kind::half_space:

@@ -2,9 +2,10 @@
 """How a part follows a hand in flexel clay, by number of cells: processor time of each stage a frame, frames a second and milliseconds from
 the hand to the drawn picture, in Chromium without a graphics card (SwiftShader), and to the frame alone. The hand goes on by a
 thirtieth of a second with each frame, however long that took, so that a busy machine is given the same work. The page's
-weight and load time. Prints the tables of docs/guide/clay.md; --pictures FOLDER makes its pictures.
+weight and load time. Prints the tables of docs/guide/clay.md; --tools prints the one of tools alone, without a browser; --pictures FOLDER makes its
+pictures.
 
-    PATH=build/release/bin:$PATH bench/live/clay.py [--frames N] [--pictures FOLDER]
+    PATH=build/release/bin:$PATH bench/live/clay.py [--frames N] [--tools] [--pictures FOLDER]
 """
 
 import argparse
@@ -80,21 +81,46 @@ def stages_of(process, folder):
     return total
 
 
-def by_program(url, process, frames):
+def by_program(url, process, frames, take="grab face bracket/2", pose=lambda k: f"0 0 0 {2e-3 * math.sin(math.pi * k / HZ)}"):
     """Frames a second, processor time a pose [s] and latencies [s] of a client that poses as soon as it knows of the pose before."""
     hand = Hand(url, 16 * "b")
-    hand.act("take", "grab face bracket/2")
+    hand.act("take", take)
     latencies, used, began = [], spent(process.pid), time.monotonic()
     for k in range(frames):
         now = time.monotonic()
-        status, text = hand.post(f"0 0 0 {2e-3 * math.sin(math.pi * k / HZ)}")
+        status, text = hand.post(pose(k))
         line = json.loads(text)["line"]
         while hand.last["line"] < line and time.monotonic() < now + 10:
             time.sleep(0.0005)
         latencies.append(time.monotonic() - now)
     rate, work = frames / (time.monotonic() - began), (spent(process.pid) - used) / frames
+    hand.act("stay")
     hand.leave()
     return rate, work, latencies
+
+
+# By name: what takes hold, and where it is led, k thirtieths of a second on.
+TOOLS = {
+    "a face": ("grab face bracket/2", lambda k: f"0 0 0 {2e-3 * math.sin(math.pi * k / HZ)}"),
+    "a ball of the part": ("grab at 0.0796 0.02 0.003 0.004", lambda k: f"0 0 0 {2e-3 * math.sin(math.pi * k / HZ)}"),
+    "pushing with a ball": ("push ball 0.07 0.02 0.006 0 0 1 0.006", lambda k: f"0 0 0 {-1e-3 * (1 - math.cos(math.pi * k / HZ))}"),
+    "pushing with a plate": ("push plate 0.06 0.02 0.006 0 0 1 0.008", lambda k: f"0 0 0 {-1e-3 * (1 - math.cos(math.pi * k / HZ))}"),
+    "carving along": ("grab face bracket/2", lambda k: f"carve {'to' if k else 'from'} {0.02 + 5e-4 * k} 0.02 0.006{'' if k else ' 0.004'}"),
+}
+
+
+def measure_tools(count, frames):
+    with clay("bracket.step", "--count", str(count)) as (url, process):
+        setup = Hand(url, 16 * "c")
+        elements = sum(1 for _ in setup.settled()["positions"]) // 3
+        setup.act("hold bracket/1")
+        setup.leave()
+        for name, (take, pose) in TOOLS.items():
+            rate, work, latencies = by_program(url, process, frames, take, pose)
+            print(f"| {elements:,} | {name} | {1e3 * work:.0f} | {rate:.1f} | {1e3 * statistics.median(latencies):.0f} |", flush=True)
+            after = Hand(url, 16 * "d")
+            after.act("take", "undo", "undo")
+            after.leave()
 
 
 def page_weight():
@@ -163,6 +189,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--frames", type=int, default=90)
     parser.add_argument("--pictures")
+    parser.add_argument("--tools", action="store_true")
     parser.add_argument("--counts", default="1000,5000,20000")
     options = parser.parse_args()
     folder = pathlib.Path(options.pictures).resolve() if options.pictures else None
@@ -171,6 +198,12 @@ def main():
         subprocess.run([pathlib.Path(os.environ["FLEXEL_BIN"]) / "make_bracket", "bracket.step"], check=True)
         if folder:
             return pictures(folder)
+        if options.tools:
+            print(f"Load of the machine before: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores\n")
+            print("| elements | tool | processor ms a pose | poses a second | ms, median |\n|---|---|---|---|---|", flush=True)
+            for count in options.counts.split(","):
+                measure_tools(int(count), options.frames)
+            return os.chdir("/")
         print(f"The page without data: {page_weight():.2f} MB (bracket.step included); load of the machine before: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores\n")
         print("| cells asked for | elements | processor ms a pose, program | poses a second | ms, median | run | page, its map | drawing | rest | two cores would show | drawn a second | ms to the picture, median | 95 % | loaded after |")
         print("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|", flush=True)

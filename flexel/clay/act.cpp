@@ -94,14 +94,27 @@ Act ball_act(Act::Kind kind, const std::string& rest, const std::string& place) 
   const bool glues = kind == Act::Kind::glue;
   const std::vector<std::string> words = words_of(rest);
   if (words.size() != (glues ? 6 : 5) || words[0] != "at")
-    throw InputError(place,
-                     glues ? "glue: give \"at X Y Z RADIUS WITHIN\"" : "carve: give \"at X Y Z RADIUS\"");
+    throw InputError(place, glues ? "glue: give \"at X Y Z RADIUS WITHIN\""
+                                  : "carve: give \"at X Y Z RADIUS\", \"from X Y Z RADIUS\" or \"to X Y Z\"");
   Act act{kind, "", {}};
   act.at = vector(words, 1, kFarthest, place);
   act.radius = number(words[4], kFarthest, place);
   if (!(act.radius > 0)) throw InputError(place, "a ball has a radius above 0");
   if (glues) act.within = number(words[5], kFarthest, place);
   if (glues && !(act.within > 0)) throw InputError(place, "glue reaches farther than 0");
+  return act;
+}
+
+// "from X Y Z RADIUS", or "to X Y Z"
+Act draw_act(const std::string& rest, const std::string& place) {
+  const std::vector<std::string> words = words_of(rest);
+  Act act{Act::Kind::draw, "", {}};
+  act.on = words[0] == "from";
+  if (words.size() != (act.on ? 5 : 4))
+    throw InputError(place, act.on ? "carve: give \"from X Y Z RADIUS\"" : "carve: give \"to X Y Z\"");
+  act.way = {vector(words, 1, kFarthest, place)};
+  if (act.on) act.radius = number(words[4], kFarthest, place);
+  if (act.on && !(act.radius > 0)) throw InputError(place, "a ball has a radius above 0");
   return act;
 }
 
@@ -136,6 +149,7 @@ Act parse_act(const std::string& line, const std::string& place) {
   }
   if (word == "grab") return grab_act(rest, place);
   if (word == "push") return push_act(rest, place);
+  if (word == "carve" && (rest.starts_with("from ") || rest.starts_with("to "))) return draw_act(rest, place);
   if (word == "carve") return ball_act(Act::Kind::carve, rest, place);
   if (word == "glue") return ball_act(Act::Kind::glue, rest, place);
   if (word == "hand") return hand_act(rest, place);
@@ -144,6 +158,7 @@ Act parse_act(const std::string& line, const std::string& place) {
   if (word == "stay") return plain(Act::Kind::stay);
   if (word == "release") return plain(Act::Kind::release);
   if (word == "keep") return plain(Act::Kind::keep);
+  if (word == "cancel") return plain(Act::Kind::cancel);
   if (word == "undo") return plain(Act::Kind::undo);
   if (word == "redo") return plain(Act::Kind::redo);
   if (word == "take") return plain(Act::Kind::take);

@@ -19,7 +19,9 @@ struct Act {
     release,  // the last tool lets go
     keep,     // the present shape becomes the rest shape
     carve,    // what rests in a ball goes
+    draw,     // likewise along the way of a hand, which is one act until it leaves
     glue,     // parts are held together where they are near, in a ball
+    cancel,   // the hand leaves, and what it led or carved along its way is undone
     undo,
     redo,
     material,
@@ -31,10 +33,11 @@ struct Act {
   ToolPose pose = {};      // pose, hand
   Vec3 at = Vec3::Zero();  // m, rest: carve, glue, and grab, where `name` is ""; now: push, where it touches
   double radius = 0;       // m, likewise
-  bool on = true;          // hold
+  bool on = true;          // hold; draw: the ball is put down, else it goes straight on to `way`
   double within = 0;       // m, glue: how near
-  std::string material = {};  // paint
-  Vec3 from = Vec3::Zero();   // push: unit vector, from the part to where the tool comes from
+  std::string material = {};   // paint
+  Vec3 from = Vec3::Zero();    // push: unit vector, from the part to where the tool comes from
+  std::vector<Vec3> way = {};  // m, rest: draw
 };
 
 // What one message says.

@@ -94,6 +94,22 @@ std::string change_text(const Act& act) {
   return text;
 }
 
+std::string change_text(const std::vector<CarvedWay>& ways) {
+  std::string where;
+  for (const CarvedWay& way : ways) {
+    if (!where.empty()) where += ",\n  ";
+    if (way.path.size() == 1) {
+      where += where_of_ball(way.path.front(), way.radius);
+      continue;
+    }
+    std::string path;
+    for (const Vec3& place : way.path) path += (path.empty() ? "" : ",\n    ") + lengths(place);
+    where += fmt::format("{{ sphere = {{ path = [{}], radius = \"{:.17g} m\" }} }}", path, way.radius);
+  }
+  return fmt::format("\n[[event]]\ndo = \"carve\"\npositions = \"rest\"\nwhere = {}\n",
+                     ways.size() == 1 ? where : "[" + where + "]");
+}
+
 std::string scene_text(const ClayDocument& document, const std::string& base, bool keep) {
   std::string text;
   if (!document.material.empty()) text += "material = " + where_of_name(document.material) + "\n";

@@ -25,6 +25,12 @@ struct ClayTool {
   [[nodiscard]] int steps(const ToolPose& way) const;
 };
 
+// A ball that is led along a way and carves.
+struct CarvedWay {
+  std::vector<Vec3> path;  // m, rest: straight from each place to the next
+  double radius = 0;       // m
+};
+
 struct NumberedBody {
   std::shared_ptr<const Body> body;
   std::shared_ptr<const std::vector<std::uint32_t>> element;  // (elements) numbers before anything was carved
@@ -61,7 +67,8 @@ void forget_oldest(std::vector<ClayDocument>& undo, std::size_t most, std::size_
 // TOML of the shape of an [[indenter]].
 [[nodiscard]] std::string shape_text(const simulate::IndenterShape& shape,
                                      const simulate::IndenterPlace& place);
-// The [[event]] of an act that carves or glues.
+// The [[event]] of an act that carves or glues; of ways that are carved along.
 [[nodiscard]] std::string change_text(const Act& act);
+[[nodiscard]] std::string change_text(const std::vector<CarvedWay>& ways);
 
 }  // namespace flexel::clay

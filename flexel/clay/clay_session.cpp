@@ -32,7 +32,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMostWaiting = 256, kMostHolds = 64, kMostTools = 16, kMostUndo = 100,
-                      kMostChanges = 64;
+                      kMostChanges = 64, kMostPlaces = 2000;
 constexpr std::size_t kMostUndoElements = 5'000'000;  // some 200 bytes each
 constexpr double kFollowTolerance = 1e-2, kDragTolerance = 1e-4;
 constexpr int kDragIterations = 12, kIterations = 40, kMostHalvings = 6;
@@ -126,7 +126,7 @@ std::string header_of(const Body& body) {
     parts.push_back({{"name", printable(body.parts[p].name)}, {"begin", begin}, {"end", end}});
   }
   const Json header = {{"flexel-live", 1},
-                       {"clay", 3},
+                       {"clay", 4},
                        {"rate", 0},
                        {"state_every", 1},
                        {"elements", body.element_count()},
@@ -152,6 +152,35 @@ void refuse_detour(const ClayDocument& document, const std::string& base) {
         fmt::format("{} was led around the part, and a scene leads it straight, through the part: let it go, "
                     "and put a tool where it is now",
                     name));
+}
+
+void refuse_more_changes(const ClayDocument& document) {
+  if (document.changes.size() == kMostChanges)
+    throw InputError("64 places were carved or glued: hold the part, and keep its shape before the next");
+}
+
+void renew_surface(ClayDocument& document, std::uint64_t number) {
+  document.surface = std::make_shared<const std::string>(surface_pack(document.now));
+  document.surface_number = number;
+}
+
+// Why no element is in what a ball sweeps; "": some are.
+std::string why_empty(const CarvedWay& way, const Body& body) {
+  simulate::Selection swept;
+  swept.kind = simulate::Selection::Kind::sphere;
+  swept.point = way.path.front();
+  swept.radius = way.radius;
+  for (std::size_t k = 0; way.path.size() > 1 && k < way.path.size(); ++k)
+    swept.members.emplace_back().point = way.path[k];
+  try {
+    return (void)resolve(swept, body), "";
+  } catch (const simulate::EmptySelectionError& error) {
+    return error.what();
+  }
+}
+
+bool takes_more_places(const Act& act) {
+  return act.kind == Act::Kind::draw && act.way.size() < kMostPlaces;
 }
 
 bool is_motion(const Act& act) {
@@ -204,7 +233,13 @@ Answer ClaySession::act(const std::string& message) {
   heard_ = now;
   if (queue_.size() + said.acts.size() > kMostWaiting) return {429, "too many acts wait\n"};
   for (Act& act : said.acts) {
-    if (is_motion(act)) ++line_;
+    if (act.kind == Act::Kind::draw && !act.on && !queue_.empty() && takes_more_places(queue_.back().act)) {
+      std::vector<Vec3>& way = queue_.back().act.way;
+      way.insert(way.end(), act.way.begin(), act.way.end());
+      queue_.back().line = ++line_;
+      continue;
+    }
+    if (is_motion(act) || act.kind == Act::Kind::draw) ++line_;
     if (is_motion(act) && !queue_.empty() && is_motion(queue_.back().act)) queue_.pop_back();
     queue_.push_back({std::move(act), line_});
   }
@@ -225,8 +260,9 @@ void ClaySession::left(const std::string& client) {
   if (holder_ == client) give_tool("");
 }
 
-// Under the mutex.
+// Under the mutex. A stroke ends with the hand that made it.
 void ClaySession::give_tool(const std::string& client) {
+  if (!holder_.empty() && holder_ != client) queue_.push_back({{Act::Kind::stay, "", {}}, line_});
   news_ = news_ || holder_ != client;
   holder_ = client;
   heard_ = Clock::now();
@@ -275,7 +311,7 @@ void ClaySession::run() {
       return;
     } catch (const std::exception& error) {
       said_ = error.what();
-      stroke_ = {};
+      halt();
       const std::lock_guard lock(mutex_);
       settle(!leads);  // after an act or a way that failed the part comes to rest where it is
     }
@@ -285,19 +321,22 @@ void ClaySession::run() {
 
 void ClaySession::perform(const Act& act) {
   if (act.kind == Act::Kind::take) return;
+  if (act.kind == Act::Kind::draw) return draw(act);
+  if (act.kind == Act::Kind::stay) return stay();
   said_.clear();
+  if (act.kind == Act::Kind::cancel) return cancel();
   if (!is_motion(act)) {
     const bool travels = act.kind == Act::Kind::undo || act.kind == Act::Kind::redo;
     if (!travels) arrive();
     stroke_ = {};
-    if (act.kind == Act::Kind::stay) return;
     if (!travels) rest();
     return change(act);
   }
   if (document_.tools.empty()) throw InputError("no tool is there to be led: pull at a place first");
   if (!stroke_.begun) {
+    stroke_ = {};
     rest();
-    remember();
+    remember(document_);
   }
   stroke_.begun = true;
   const Clock::time_point now = Clock::now();
@@ -313,8 +352,28 @@ void ClaySession::perform(const Act& act) {
   lead();
 }
 
-void ClaySession::remember() {
-  undo_.push_back(document_);
+// The hand leaves: what it led stays where it is, and says still why it went no further.
+void ClaySession::stay() {
+  arrive();
+  const std::optional<Carving> carving = std::exchange(stroke_, {}).carving;
+  if (carving && !carving->changed && !carving->refused) throw InputError(carving->nothing);
+}
+
+void ClaySession::cancel() {
+  const bool led = stroke_.begun || (stroke_.carving && stroke_.carving->changed);
+  stroke_ = {};
+  if (led) travel(true);
+}
+
+// The stroke goes no further; where the hand leads it next is part of it still.
+void ClaySession::halt() {
+  if (stroke_.carving) stroke_.carving->refused = true;
+  stroke_.hand.reset();
+  if (stroke_.begun) stroke_.target = document_.tools.back().pose;
+}
+
+void ClaySession::remember(ClayDocument before) {
+  undo_.push_back(std::move(before));
   forget_oldest(undo_, kMostUndo, kMostUndoElements);
   redo_.clear();
 }
@@ -351,15 +410,72 @@ void ClaySession::change(const Act& act) {
     if (!next.changes.empty()) apply_changes(next, base_);  // glue is as stiff as what it holds
   }
   ClayDocument before = document_;
+  act.kind == Act::Kind::carve ? take_up_carved(std::move(next)) : take_up(std::move(next));
+  remember(std::move(before));
+}
+
+void ClaySession::take_up_carved(ClayDocument next) {
   try {
     take_up(std::move(next));
   } catch (const InputError& error) {
-    if (act.kind != Act::Kind::carve) throw;
     throw InputError(fmt::format("carve: what is left is not held and led as before ({})", error.what()));
   }
-  std::swap(before, document_);
-  remember();
-  document_ = std::move(before);
+}
+
+// Carves along the way of the hand, as one act however often more of it comes. Once it was refused the rest is passed over,
+// until the hand leaves.
+void ClaySession::draw(const Act& act) {
+  if (!stroke_.carving) {
+    if (!act.on) throw InputError("nothing is carved along: put the ball down first");
+    said_.clear();
+    arrive();
+    stroke_ = {};
+    stroke_.carving.emplace().body = document_.now.body;
+    rest();
+    refuse_more_changes(document_);
+  }
+  Carving& carving = *stroke_.carving;
+  if (carving.refused) return;
+  if (act.on) {
+    carving.ways.push_back({{}, act.radius});
+    carving.holds.push_back(0);
+  }
+  std::vector<Vec3>& path = carving.ways.back().path;
+  path.insert(path.end(), act.way.begin(), act.way.end());
+  carving.places += act.way.size();
+  if (carving.places > kMostPlaces)
+    throw InputError("the way has 2,000 places: lift the tool before it goes on");
+  if (!draws_on()) carve_drawn();
+}
+
+// What goes is what the whole way sweeps, as in the scene, however it came in pieces.
+void ClaySession::carve_drawn() {
+  Carving& carving = *stroke_.carving;
+  std::vector<CarvedWay> ways;
+  for (std::size_t k = 0; k < carving.ways.size(); ++k) {
+    if (!carving.holds[k]) carving.nothing = why_empty(carving.ways[k], *carving.body);
+    carving.holds[k] = carving.holds[k] || carving.nothing.empty();
+    if (carving.holds[k]) ways.push_back(carving.ways[k]);
+  }
+  if (ways.empty()) return;
+  ClayDocument next = document_;
+  if (carving.changed) next.changes.pop_back();
+  next.changes.push_back(change_text(ways));
+  try {
+    apply_changes(next, base_);
+  } catch (const simulate::EmptySelectionError& error) {
+    carving.nothing = error.what();
+    return;
+  }
+  if (carving.changed && *next.now.element == *document_.now.element) {
+    document_.changes = std::move(next.changes);
+    return;
+  }
+  renew_surface(next, frame_);
+  ClayDocument before = document_;
+  take_up_carved(std::move(next));
+  if (!carving.changed) remember(std::move(before));
+  carving.changed = true;
 }
 
 void ClaySession::grab(const Act& act, ClayDocument& next) const {
@@ -426,13 +542,10 @@ void ClaySession::paint(const Act& act, ClayDocument& next) const {
 }
 
 void ClaySession::alter(const Act& act, ClayDocument& next) const {
-  if (next.changes.size() == kMostChanges)
-    throw InputError("64 places were carved or glued: hold the part, and keep its shape before the next");
+  refuse_more_changes(next);
   next.changes.push_back(change_text(act));
   apply_changes(next, base_);
-  if (act.kind != Act::Kind::carve) return;
-  next.surface = std::make_shared<const std::string>(surface_pack(next.now));
-  next.surface_number = frame_;
+  if (act.kind == Act::Kind::carve) renew_surface(next, frame_);
 }
 
 void ClaySession::keep(ClayDocument& next) const {
@@ -536,6 +649,11 @@ bool ClaySession::more_waits() {
   return !queue_.empty();
 }
 
+bool ClaySession::draws_on() {
+  const std::lock_guard lock(mutex_);
+  return !queue_.empty() && queue_.front().act.kind == Act::Kind::draw;
+}
+
 // One step of the tool towards where it should be; a shorter one where the part does not follow so far at once. `obeys`: it
 // stops trying where other acts wait.
 void ClaySession::lead(bool obeys) {
@@ -550,7 +668,7 @@ void ClaySession::lead(bool obeys) {
     learn_stiffness(before, force);
     return;
   }
-  stroke_ = {};
+  halt();
   throw InputError("the part does not follow further: it would fold or buckle");
 }
 

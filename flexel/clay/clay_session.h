@@ -45,11 +45,20 @@ class ClaySession {
 
  private:
   using Clock = std::chrono::steady_clock;
-  struct Stroke {                  // of the hand that leads the last tool
+  struct Carving {                     // along the way of the hand
+    std::shared_ptr<const Body> body;  // that it began with
+    std::vector<CarvedWay> ways;       // one each time that the ball was put down
+    std::vector<std::uint8_t> holds;   // (ways) whether some element is in it
+    std::size_t places = 0;            // of all ways
+    bool changed = false, refused = false;
+    std::string nothing;  // why nothing goes so far
+  };
+  struct Stroke {                  // of the hand that leads the last tool, or carves
     std::optional<ToolPose> hand;  // nothing: the tool is led itself, to `target`
     ToolPose target;
     double spring = 0, part = 0;  // N/m: of the hand, of the part at the tool; 0: not known yet
     bool begun = false;
+    std::optional<Carving> carving;
   };
   void run();
   void give_tool(const std::string& client);
@@ -61,7 +70,13 @@ class ClaySession {
   void keep(ClayDocument& next) const;
   void paint(const Act& act, ClayDocument& next) const;
   void alter(const Act& act, ClayDocument& next) const;
+  void draw(const Act& act);
+  void carve_drawn();
   void take_up(ClayDocument next);
+  void take_up_carved(ClayDocument next);
+  void stay();
+  void cancel();
+  void halt();
   void travel(bool back);
   void lead(bool obeys = true);
   void arrive();
@@ -75,8 +90,9 @@ class ClaySession {
   void retreat();
   [[nodiscard]] std::vector<ToolPose> poses_with(const ToolPose& last) const;
   void learn_stiffness(const ToolPose& before, const Vec3& force);
-  void remember();
+  void remember(ClayDocument before);
   [[nodiscard]] bool more_waits();
+  [[nodiscard]] bool draws_on();
   void publish();
   [[nodiscard]] std::optional<Answer> drawn(const std::string& name);
   [[nodiscard]] std::string head(std::size_t bytes) const;
@@ -100,7 +116,7 @@ class ClaySession {
   std::condition_variable changed_;
   struct Waiting {
     Act act;
-    std::uint64_t line = 0;  // number of the last pose up to it
+    std::uint64_t line = 0;  // number of the last pose, or place of a way, up to it
   };
   std::deque<Waiting> queue_;
   std::string holder_;

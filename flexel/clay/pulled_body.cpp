@@ -32,6 +32,9 @@ constexpr double kLeastScale = 1e-2;  // of the strongest force so far
 constexpr int kMostSteps = 4, kMostGradients = 8;
 constexpr double kLeastForcing = 0.05, kMostForcing = 0.2;  // of the linear solution
 constexpr double kServes = 0.6;  // a step with a tangent that serves leaves at most this of the residual
+// Likewise where tools push: points come to touch, and cease to, with each step
+constexpr int kMostTouchingSteps = 16, kTouchingGradients = 12, kStepsOfATangent = 6;
+constexpr double kTouchingForcing = 0.1, kArmijo = 1e-4, kShortestStep = 1.0 / 1024, kFar = 0.3;
 
 simulate::Problem problem_of(const simulate::Scene& scene, const Body& body,
                              const simulate::Fragments& fragments) {
@@ -190,16 +193,21 @@ bool PulledBody::solve(const std::vector<ToolPose>& poses, double tolerance, int
 }
 
 bool PulledBody::follow(const std::vector<ToolPose>& poses, double tolerance) {
-  if (!memory_.factored || memory_.projected || mechanics_->follows() || pushers_of(tools_) > 0) return false;
+  if (!memory_.factored || memory_.projected || mechanics_->follows()) return false;
+  const simulate::Indenters* indenters = simulate::find_indenters(mechanics_->effects());
+  const std::vector<simulate::IndenterPlace> places =
+      indenters ? indenters->places(state_.share) : std::vector<simulate::IndenterPlace>{};
   lead_ties(poses);
   simulate::State begun = state_;
   answers_.add(way_between(poses_, poses), begun.displacement);
   apply(mechanics_->constraints(), body_, begun, begun.displacement);
   Iterate at = iterate(std::move(begun));
-  bool found = at.residual <= tolerance;
-  for (int step = 0; !found && step < kMostSteps && improve(at, tolerance); ++step)
+  bool found = indenters ? improve_touching(at, tolerance) : at.residual <= tolerance;
+  for (int step = 0; !indenters && !found && step < kMostSteps && improve(at, tolerance); ++step)
     found = at.residual <= tolerance;
-  if (!found || !std::isfinite(mechanics_->energy(at.state))) {
+  if (!found || !std::isfinite(mechanics_->energy(at.state)) ||
+      (indenters && !indenters->gone_through(places, state_.displacement, at.state).empty())) {
+    if (indenters) memory_.model_error = 1;  // the tangent is of nowhere
     lead_ties(poses_);
     return false;
   }
@@ -214,7 +222,8 @@ PulledBody::Iterate PulledBody::iterate(simulate::State state) {
   at.unbalanced = at.forces.total;
   clear_prescribed(mechanics_->constraints(), at.unbalanced);
   const double scale = std::max(at.forces.scale, kLeastScale * strongest_);
-  at.residual = std::sqrt(simulate::dot(at.unbalanced, at.unbalanced)) / scale;
+  at.left = std::sqrt(simulate::dot(at.unbalanced, at.unbalanced));
+  at.residual = at.left / scale;
   return at;
 }
 
@@ -229,11 +238,54 @@ bool PulledBody::improve(Iterate& at, double tolerance) {
   simulate::State moved = at.state;
   parallel_for_each(step.size(), [&](std::size_t e) { moved.displacement[e] += step[e]; });
   Iterate next = iterate(std::move(moved));
-  if (next.residual <= std::max(tolerance, kServes * at.residual))
+  if (next.residual <= tolerance || next.left <= kServes * at.left)
     at = std::move(next);
   else
     renew_tangent(at.state);
   return true;
+}
+
+// One step where tools push. What touches changes from step to step, so what the tools add to the tangent is made anew at
+// each, the rest seldom; how far it goes the energy tells, for the forces that are left rise where more points touch. Forces
+// on points that are hardly inside go by the square of the depth, and Newton's step gets them half the way out: far from the
+// solution twice the step is tried too. Gives how far it went; 0: no step lowers the energy.
+double PulledBody::touch(Iterate& at, bool renew) {
+  if (!std::isfinite(at.residual)) return 0;
+  if (renew || !mechanics_->renew_effects(at.state))
+    renew_tangent(at.state);
+  else
+    memory_.preconditioner->refresh_smoother();
+  memory_.stale = true;
+  std::vector<Vec3> way;
+  const simulate::LinearResult linear =
+      conjugate_gradients(mechanics_->whole_tangent(), at.unbalanced, way, *memory_.preconditioner,
+                          kTouchingForcing, kTouchingGradients);
+  if (linear.indefinite) return 0;
+  const auto moved = [&](double share) {
+    simulate::State state = at.state;
+    parallel_for_each(way.size(), [&](std::size_t e) { state.displacement[e] += share * way[e]; });
+    return state;
+  };
+  const double before = mechanics_->energy(at.state), falls = simulate::dot(at.unbalanced, way);
+  double share = 1, energy = mechanics_->energy(moved(share));
+  while (!(energy <= before - kArmijo * share * falls)) {
+    if ((share /= 4) < kShortestStep) return 0;
+    energy = mechanics_->energy(moved(share));
+  }
+  if (share == 1 && at.residual > kFar && mechanics_->energy(moved(2)) < energy) share = 2;
+  at = iterate(moved(share));
+  return share;
+}
+
+// A tangent none of whose steps serves is of another shape.
+bool PulledBody::improve_touching(Iterate& at, double tolerance) {
+  bool renew = false;
+  for (int step = 1; at.residual > tolerance && step <= kMostTouchingSteps; ++step) {
+    const double share = touch(at, renew || step % kStepsOfATangent == 0);
+    if (share == 0 && renew) return false;
+    renew = share == 0;
+  }
+  return at.residual <= tolerance;
 }
 
 void PulledBody::renew_tangent(const simulate::State& state) {

@@ -58,7 +58,7 @@ class PulledBody {
             const std::function<void()>& stop);
 
   // Moves near the equilibrium with tools at `poses`: to a residual of `tolerance`, with the tangent that is there while it serves,
-  // at a fraction of what lead() costs. False, and nothing has changed, where that is not enough, or a tool pushes.
+  // at a fraction of what lead() costs. False, and nothing has changed, where that is not enough.
   bool follow(const std::vector<ToolPose>& poses, double tolerance);
   // Back to where lead() found an equilibrium to kRest last, or where it began.
   void retreat();
@@ -82,11 +82,13 @@ class PulledBody {
   struct Iterate {
     simulate::State state;
     simulate::Forces forces;
-    std::vector<Vec3> unbalanced;  // (elements) N, on free components
-    double residual = 0;           // relative
+    std::vector<Vec3> unbalanced;   // (elements) N, on free components
+    double left = 0, residual = 0;  // N, their norm; relative
   };
   [[nodiscard]] Iterate iterate(simulate::State state);
   [[nodiscard]] bool improve(Iterate& at, double tolerance);
+  [[nodiscard]] double touch(Iterate& at, bool renew);
+  [[nodiscard]] bool improve_touching(Iterate& at, double tolerance);
   void renew_tangent(const simulate::State& state);
   void accept(simulate::State state, const std::vector<ToolPose>& poses, double residual);
   void measure(const std::vector<Vec3>& unbalanced);

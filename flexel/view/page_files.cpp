@@ -37,6 +37,7 @@ FLEXEL_TAKE_IN("controls", FLEXEL_PAGE_FOLDER "controls.js");
 FLEXEL_TAKE_IN("probes", FLEXEL_PAGE_FOLDER "probes.js");
 FLEXEL_TAKE_IN("record", FLEXEL_PAGE_FOLDER "record.js");
 FLEXEL_TAKE_IN("stream", FLEXEL_PAGE_FOLDER "stream.js");
+FLEXEL_TAKE_IN("way", FLEXEL_PAGE_FOLDER "way.js");
 FLEXEL_TAKE_IN("clay", FLEXEL_PAGE_FOLDER "clay.js");
 FLEXEL_TAKE_IN("main", FLEXEL_PAGE_FOLDER "main.js");
 
@@ -67,6 +68,7 @@ FLEXEL_TAKEN(controls)
 FLEXEL_TAKEN(probes)
 FLEXEL_TAKEN(record)
 FLEXEL_TAKEN(stream)
+FLEXEL_TAKEN(way)
 FLEXEL_TAKEN(clay)
 FLEXEL_TAKEN(main)
 
@@ -93,7 +95,7 @@ const PageFiles& page_files() {
     for (const std::string_view text :
          {unpack_text(), numbers_text(), paint_text(), shape_text(), elements_text(), camera_text(),
           coarse_text(), smooth_text(), panel_text(), overlay_text(), scene_text(), probes_text(),
-          record_text(), controls_text(), stream_text(), clay_text(), main_text()})
+          record_text(), controls_text(), stream_text(), way_text(), clay_text(), main_text()})
       append_module(text, all);
     return all;
   }();

@@ -180,6 +180,14 @@ void Mechanics::eliminate_prescribed() {
     eliminate(constraints_, pattern_.matrix);
 }
 
+bool Mechanics::renew_effects(const State& state) {
+  if (!made_ || follows()) return false;
+  BlockMatrix& added = made_->added();
+  std::fill(added.values.begin(), added.values.end(), Block::Zero());
+  for (const ActiveEffect& effect : effects_) effect->add_stiffness(state, added);
+  return true;
+}
+
 bool Mechanics::unilateral() const {
   return std::any_of(effects_.begin(), effects_.end(),
                      [](const ActiveEffect& effect) { return effect->unilateral(); });

@@ -76,6 +76,9 @@ class Mechanics {
   // Tangent stiffness into tangent(), prescribed components not yet eliminated.
   void assemble(const State& state, const TangentOptions& tangent = {});
   void eliminate_prescribed();
+  // Of the tangent only what effects add is made anew, at `state`; what was eliminated stays so. False, and nothing has
+  // changed, where that is stored together with the rest, or a load follows the shape.
+  [[nodiscard]] bool renew_effects(const State& state);
   // Groups of elements that effects couple (bonds).
   [[nodiscard]] std::vector<CoupledElements> coupled_elements() const { return coupled(effects_); }
   // (elements) 1 where a tie holds or leads an element along some directions, 2 along all, else 0.

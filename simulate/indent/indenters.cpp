@@ -99,6 +99,22 @@ Vec3 moved(const SurfacePoint& point, const std::vector<Vec3>& displacement) {
   return place;
 }
 
+// Whether what these eight corners carry, points whose weights' absolute values sum to `spread` at most, comes nowhere near an
+// indenter while both go from one place to the other.
+bool stays_away(const IndenterShape& shape, const std::array<IndenterPlace, 2>& places, double spread,
+                const std::array<Vec3, 8>& from, const std::array<Vec3, 8>& to) {
+  const Vec3 middle = std::accumulate(from.begin(), from.end(), Vec3(Vec3::Zero())) / 8;
+  double reach = 0, moved = 0;
+  for (std::size_t a = 0; a < 8; ++a) {
+    reach = std::max(reach, spread * (from[a] - middle).norm());
+    moved = std::max(moved, spread * (to[a] - from[a]).norm());
+  }
+  const double arm = (middle - places[0].centre).norm() + reach + moved + shape.radius;
+  const double turned = 2 * (places[1].normal - places[0].normal).norm();  // an arc is longer than its chord
+  const double way = (places[1].centre - places[0].centre).norm() + turned * arm;
+  return gap_to(shape, places[0], middle).distance > reach + moved + way;
+}
+
 // What an indenter can do nothing at.
 void refuse_unfit(const Indenter& indenter, const Problem& problem) {
   const auto refuse = [&](const std::string& why) {
@@ -344,6 +360,7 @@ std::string Indenters::gone_through(const std::vector<IndenterPlace>& before,
     const std::array<IndenterPlace, 2> places{before[i], indenters_[i].at(state.share)};
     for (const Patch& patch : patches_) {
       const std::array<Vec3, 8> from = corners(patch, displacement), to = corners(patch, state.displacement);
+      if (stays_away(indenters_[i].shape, places, patch.spread, from, to)) continue;
       for (std::uint32_t q = patch.begin; q < patch.end; ++q) {
         std::array<Vec3, 2> point{Vec3::Zero(), Vec3::Zero()};
         for (std::size_t a = 0; a < 8; ++a) {

@@ -26,6 +26,25 @@ Vec3 required_point(TableReader& reader, const char* key) {
   return reader.to_vector(reader.require(key, "[\"0 mm\", \"0 mm\", \"0 mm\"]"), Dimension::length, key);
 }
 
+// In one place, or swept along a path.
+void parse_sphere(TableReader& reader, Selection& sphere) {
+  const SceneValue* path = reader.find("path");
+  if (!path) {
+    sphere.point = required_point(reader, "centre");
+  } else {
+    if (reader.find("centre"))
+      reader.fail(path->line, "sphere: give either \"centre\" or \"path\", along which it is swept");
+    if (path->kind != SceneValue::Kind::array || path->items.size() < 2)
+      reader.fail(path->line,
+                  "sphere: \"path\" needs two places or more: [[\"0 mm\", 0, 0], [\"9 mm\", 0, 0]]");
+    for (const SceneValue& place : path->items)
+      sphere.members.emplace_back().point = reader.to_vector(place, Dimension::length, "path");
+    sphere.point = sphere.members.front().point;
+  }
+  sphere.radius = reader.to_quantity(reader.require("radius", "\"5 mm\""), Dimension::length, "radius");
+  if (!(sphere.radius > 0)) reader.fail("sphere: \"radius\" needs to be above 0");
+}
+
 Selection parse_table(const SceneValue& value, const TableReader& outer) {
   TableReader reader(value, outer.file(), "\"where\"");
   std::vector<Selection> found;
@@ -36,12 +55,7 @@ Selection parse_table(const SceneValue& value, const TableReader& outer) {
       if ((s.min.array() > s.max.array()).any()) r.fail("box: \"min\" lies above \"max\"");
     }));
   if (const SceneValue* sphere = reader.find("sphere"))
-    found.push_back(
-        parse_shape(Selection::Kind::sphere, *sphere, outer, "sphere", [](TableReader& r, Selection& s) {
-          s.point = required_point(r, "centre");
-          s.radius = r.to_quantity(r.require("radius", "\"5 mm\""), Dimension::length, "radius");
-          if (!(s.radius > 0)) r.fail("sphere: \"radius\" needs to be above 0");
-        }));
+    found.push_back(parse_shape(Selection::Kind::sphere, *sphere, outer, "sphere", parse_sphere));
   if (const SceneValue* half = reader.find("half_space"))
     found.push_back(parse_shape(Selection::Kind::half_space, *half, outer, "half_space",
                                 [](TableReader& r, Selection& s) {

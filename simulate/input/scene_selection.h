@@ -6,7 +6,7 @@
 namespace flexel::simulate {
 
 // `where = "bracket/12"`, a list of selections, or one of
-//   { box = { min = [..], max = [..] } }          { sphere = { centre = [..], radius = ".." } }
+//   { box = { min = [..], max = [..] } }          { sphere = { centre or path = [..], radius = ".." } }
 //   { half_space = { point = [..], normal = [..] } }   { not = SELECTION }
 [[nodiscard]] Selection parse_selection(const SceneValue& value, const TableReader& reader);
 

@@ -304,11 +304,28 @@ Selected resolve_name(const Selection& selection, const Body& body) {
   return {found, {}};
 }
 
+// m^2, to the line from `a` to `b`.
+double squared_distance(const Vec3& point, const Vec3& a, const Vec3& b) {
+  const Vec3 way = b - a, from = point - a;
+  const double length = way.squaredNorm();
+  const double share = length > 0 ? std::clamp(from.dot(way) / length, 0.0, 1.0) : 0;
+  return (from - share * way).squaredNorm();
+}
+
+bool sweeps(const Selection& sphere, const Vec3& point) {
+  for (std::size_t k = 1; k < sphere.members.size(); ++k)
+    if (squared_distance(point, sphere.members[k - 1].point, sphere.members[k].point) <=
+        sphere.radius * sphere.radius)
+      return true;
+  return false;
+}
+
 bool holds(const Selection& selection, const Vec3& point) {
   switch (selection.kind) {
     case Selection::Kind::box:
       return (point.array() >= selection.min.array()).all() && (point.array() <= selection.max.array()).all();
     case Selection::Kind::sphere:
+      if (!selection.members.empty()) return sweeps(selection, point);
       return (point - selection.point).squaredNorm() <= selection.radius * selection.radius;
     default:
       return selection.normal.dot(point - selection.point) >= 0;
@@ -384,7 +401,7 @@ std::string describe(const Selection& selection) {
     case Selection::Kind::box:
       return "box";
     case Selection::Kind::sphere:
-      return "sphere";
+      return selection.members.empty() ? "sphere" : "swept sphere";
     case Selection::Kind::half_space:
       return "half-space";
     case Selection::Kind::complement:

@@ -18,7 +18,7 @@ struct Selection {
   Vec3 point = Vec3::Zero();       // m, centre of the sphere; a point of the half-space's plane
   Vec3 normal = Vec3::Zero();      // unit; the half-space lies on the side it points to
   double radius = 0;               // m
-  std::vector<Selection> members;  // any_of: their union; complement: the one that is left out
+  std::vector<Selection> members;  // any_of: their union; complement: what is left out; sphere: its path
   std::string origin;              // "beam.toml:12" or "--fix", for messages
 };
 

@@ -139,6 +139,41 @@ TEST(ChangedBody, WhatIsDrawnIsClosedAroundWhatIsLeft) {
   }
 }
 
+// By definition: a cell goes that has more than half of its elements in what the ball sweeps, whatever the pieces of its way.
+TEST(ChangedBody, AWayThatIsCarvedAlongHasNoGaps) {
+  std::mt19937 random(9);
+  for (int trial = 0; trial < 20; ++trial) {
+    const ClayDocument first = block(random);
+    const double radius = 1.3 * kCell;
+    CarvedWay way{{random_place(random), random_place(random), random_place(random)}, radius};
+    ClayDocument at_once = first, in_pieces = first;
+    at_once.changes = {change_text({way})};
+    apply_changes(at_once, "");
+    CarvedWay fine{{way.path[0]}, radius};
+    for (std::size_t k = 1; k < way.path.size(); ++k)
+      for (int share = 1; share <= 4; ++share)
+        fine.path.push_back(way.path[k - 1] + 0.25 * share * (way.path[k] - way.path[k - 1]));
+    in_pieces.changes = {change_text({fine})};
+    apply_changes(in_pieces, "");
+    EXPECT_EQ(*at_once.now.element, *in_pieces.now.element) << trial;
+    std::size_t left = 0;
+    for (const auto& corners : first.now.body->cell_elements) {
+      int inside = 0;
+      for (const std::uint32_t e : corners) {
+        double nearest = 1;
+        for (std::size_t k = 1; k < way.path.size(); ++k)
+          for (int share = 0; share <= 1000; ++share)
+            nearest = std::min(nearest, (first.now.body->rest[e] - way.path[k - 1] -
+                                         1e-3 * share * (way.path[k] - way.path[k - 1]))
+                                            .norm());
+        inside += nearest < radius + 1e-9;
+      }
+      left += inside <= 4;
+    }
+    EXPECT_EQ(at_once.now.body->cell_count(), left) << trial;
+  }
+}
+
 TEST(ChangedBody, NothingIsRefusedAndChangesNothing) {
   std::mt19937 random(7);
   ClayDocument document = block(random);

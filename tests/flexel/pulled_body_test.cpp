@@ -103,6 +103,68 @@ TEST(PulledBody, FollowsToTheResidualThatIsAskedAndStaysNearTheEquilibrium) {
   EXPECT_LT((rough.felt()[0].force - exact.felt()[0].force).norm(), 1e-6 * exact.felt()[0].force.norm());
 }
 
+// Their ties are stiff: the more the part resists the more both what is left and what it is measured by are theirs.
+TEST(PulledBody, FollowsFaces) {
+  const Body body = bar();
+  const char* scene =
+      "material = \"PLA\"\n[[fix]]\nwhere = \"x0\"\n"
+      "[[move]]\nwhere = \"x1\"\ndisplacement = [\"0 mm\", \"0 mm\", \"0 mm\"]\n";
+  const auto made = [&] {
+    return PulledBody(body, simulate::parse_scene(scene, "scene"),
+                      {{Vec3(kBarLength, 3 * kBarCell, 3 * kBarCell), false}}, kArm,
+                      std::vector<Vec3>(body.element_count(), Vec3::Zero()), {ToolPose{}});
+  };
+  PulledBody rough = made(), exact = made();
+  int followed = 0;
+  for (int step = 1; step <= 34; ++step) {
+    ASSERT_TRUE(exact.lead(pose(step), 1e-10, 40, kGoOn)) << step;
+    if (rough.follow(pose(step), 1e-2))
+      ++followed;
+    else
+      ASSERT_TRUE(rough.lead(pose(step), 1e-4, 40, kGoOn)) << step;
+    EXPECT_LT(farthest(rough.displacement(), exact.displacement()), 2e-4) << step;
+  }
+  EXPECT_GT(followed, 31);
+}
+
+// A ball above the end of a bar goes into it and along it, and leaves it.
+TEST(PulledBody, FollowsTheBallThatPushesIt) {
+  const Body body = bar();
+  const std::string scene =
+      "material = \"PLA\"\n[[fix]]\nwhere = \"x0\"\n"
+      "[[indenter]]\nball = { centre = [\"17 cm\", \"3 cm\", \"9 cm\"], radius = \"3 cm\" }\n";
+  const auto made = [&] {
+    return PulledBody(body, simulate::parse_scene(scene, "scene"), {{Vec3(0.17, 0.03, 0.09), true}}, kArm,
+                      std::vector<Vec3>(body.element_count(), Vec3::Zero()), {ToolPose{}});
+  };
+  PulledBody rough = made(), exact = made();
+  const auto place = [](int step) {
+    return Way{{Vec3(5e-3 * std::sin(0.2 * step), 2e-3 * std::sin(0.1 * step), -8e-3 * std::sin(0.1 * step)),
+                Vec3::Zero()}};
+  };
+  int followed = 0;
+  double strongest = 0;
+  for (int step = 1; step <= 34; ++step) {
+    ASSERT_TRUE(exact.lead(place(step), 1e-8, 40, kGoOn)) << step;
+    if (rough.follow(place(step), 1e-2)) {
+      ++followed;
+      EXPECT_LE(rough.residual(), 1e-2);
+    } else {
+      ASSERT_TRUE(rough.lead(place(step), 1e-4, 40, kGoOn)) << step;
+    }
+    const Vec3 force = exact.felt()[0].force;
+    strongest = std::max(strongest, force.norm());
+    EXPECT_LT(farthest(rough.displacement(), exact.displacement()), 2e-4) << step;  // of 8 mm
+    EXPECT_LT((rough.felt()[0].force - force).norm(), 0.02 * strongest) << step;
+  }
+  EXPECT_GT(followed, 25);
+  ASSERT_TRUE(rough.lead(place(30), 1e-8, 40, kGoOn));
+  ASSERT_TRUE(exact.lead(place(30), 1e-8, 40, kGoOn));
+  EXPECT_LT(farthest(rough.displacement(), exact.displacement()), 1e-7) << "at rest it is the same";
+  EXPECT_FALSE(rough.follow({{Vec3(0, 0, -0.2), Vec3::Zero()}}, 1e-2)) << "not through the part";
+  EXPECT_EQ(rough.poses(), place(30));
+}
+
 TEST(PulledBody, ComesBackToWhereItBegan) {
   const Body body = bar();
   PulledBody part = pulled(body);

@@ -16,6 +16,8 @@ TEST(SceneText, IsReadAsTheSame) {
   scene.parts["a \"b\""].material = "steel";
   scene.get<simulate::Supports>().ties.push_back(simulate::make_fix(simulate::parse_where(
       "{ sphere = { centre = [\"1 mm\", \"0 mm\", \"0 mm\"], radius = \"5 mm\" } }", "--fix")));
+  scene.get<simulate::Supports>().ties.push_back(simulate::make_fix(simulate::parse_where(
+      "{ sphere = { path = [[0, 0, 0], [\"1 mm\", 0, \"2 mm\"]], radius = \"3 mm\" } }", "--fix")));
   scene.get<simulate::Supports>().ties.push_back(
       simulate::make_move(simulate::parse_where("[\"xmin\", \"part/3\"]", "--move"), Vec3(1e-3, 0, 1.0 / 3)));
   simulate::Tie twist = simulate::make_move(simulate::parse_where("xmax", "--twist"), Vec3::Zero());
@@ -42,11 +44,14 @@ TEST(SceneText, IsReadAsTheSame) {
   const auto &ties = again.get<simulate::Supports>().ties, &wanted = scene.get<simulate::Supports>().ties;
   ASSERT_EQ(ties.size(), wanted.size());
   EXPECT_EQ(ties[0].where.radius, 5e-3);
-  EXPECT_EQ(ties[1].motion.translation, wanted[1].motion.translation);
-  EXPECT_LT((ties[2].motion.axis - twist.motion.axis).norm(), 1e-15);
-  EXPECT_EQ(ties[2].motion.through, twist.motion.through);
-  EXPECT_EQ(ties[2].motion.angle, 0.1);
-  EXPECT_TRUE(ties[2].is_move);
+  ASSERT_EQ(ties[1].where.members.size(), 2u);
+  EXPECT_EQ(ties[1].where.members[1].point, Vec3(1e-3, 0, 2e-3));
+  EXPECT_EQ(ties[1].where.radius, 3e-3);
+  EXPECT_EQ(ties[2].motion.translation, wanted[2].motion.translation);
+  EXPECT_LT((ties[3].motion.axis - twist.motion.axis).norm(), 1e-15);
+  EXPECT_EQ(ties[3].motion.through, twist.motion.through);
+  EXPECT_EQ(ties[3].motion.angle, 0.1);
+  EXPECT_TRUE(ties[3].is_move);
   const auto& loads = again.get<simulate::Loads>().loads;
   ASSERT_EQ(loads.size(), 3u);
   EXPECT_TRUE(loads[0].bearing);

@@ -84,6 +84,10 @@ class Browser:
         presses = [{"type": kind, "value": key} for key in text for kind in ("keyDown", "keyUp")]
         self.ask("POST", "/actions", {"actions": [{"type": "key", "id": "keys", "actions": presses}]})
 
+    def keys_with_control(self, key):
+        held = [{"type": "keyDown", "value": "\ue009"}, *({"type": kind, "value": key} for kind in ("keyDown", "keyUp")), {"type": "keyUp", "value": "\ue009"}]
+        self.ask("POST", "/actions", {"actions": [{"type": "key", "id": "keys", "actions": held}]})
+
     def choose(self, control, value):
         """Sets a control of the page as a hand would: a value, and the event that follows."""
         self.run("""const box = document.getElementById(arguments[0]);

@@ -1,6 +1,7 @@
 """The page of flexel clay in Chromium, headless: a newcomer's way, a drag that is flexel deform's move, two tabs, a run that ends."""
 
 import json
+import math
 import os
 import pathlib
 import tarfile
@@ -190,6 +191,94 @@ def test_a_ball_is_carved_out_by_a_click():
         expect_silence(browser)
 
 
+def gone_elements(browser):
+    return browser.run("const p = flexelView.clay.frame.positions; return [...Array(p.length / 3).keys()].filter(e => Number.isNaN(p[3 * e]));")
+
+
+def carve_by_hand(browser, *places):
+    """A drag through places of the window; what was posted, and the elements that are gone then."""
+    browser.run("""const {clay} = flexelView, post = clay.constructor.prototype.post;
+        window.posted = [];
+        clay.post = function (...lines) { posted.push(...lines); return post.apply(this, lines); };""")
+    browser.mouse(("move", *places[0]), ("down",), *(("move", *place) for place in places[1:]), ("up",))
+    settle(browser)
+    return browser.run("return posted"), gone_elements(browser)
+
+
+def test_a_drag_carves_without_gaps_however_fast_it_is():
+    bracket()
+    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _), chromium(WINDOW) as browser:
+        x, y = bent_by_hand(browser, url, "z")
+        browser.mouse(("move", x, y), ("up",))
+        settle(browser)
+        browser.run("flexelView.controls.look('top')")
+        browser.choose("ball", "7")
+        choose_hand(browser, "carve")
+        at = lambda *place: browser.run("return flexelView.clay.worldPoint(arguments[0]).map(Math.round)", list(place))
+        begin, middle, end = at(0.03, 0.012, 0.006), at(0.05, 0.03, 0.006), at(0.07, 0.012, 0.006)
+        posted, fast = carve_by_hand(browser, begin, middle, end)
+        expect(posted[0].startswith("carve from") and posted[-1] == "stay" and sum(line.startswith("carve from") for line in posted) == 1, f"one way: {posted}")
+        places = [[float(number) for number in line.split()[2:5]] for line in posted[:-1]]
+        expect(max(math.dist(a, b) for a, b in zip(places, places[1:])) <= 0.0071 and len(fast) > 15, f"without gaps: {len(fast)} {places}")
+        frame = browser.run("const {positions, ...frame} = flexelView.clay.frame; return frame")
+        expect(not frame["said"] and frame["felt"][0][2] > 0, f"the tool still pulls: {frame['said']} {frame['felt']}")
+        expect_drawn_as_saved(browser, url)
+        expect_same_run(url, frame, ("--crack", "cap"))
+        browser.keys_with_control("z")
+        browser.wait("flexelView.clay.frame.surface === 0")
+        expect(gone_elements(browser) == [], "one act")
+        settle(browser)
+        share = lambda a, b, k: tuple(p + (q - p) * k / 12 for p, q in zip(a, b))
+        slow = carve_by_hand(browser, begin, *(share(begin, middle, k) for k in range(1, 13)), *(share(middle, end, k) for k in range(1, 13)))[1]
+        odd = set(fast) ^ set(slow)
+        expect(len(odd) <= 2, f"a slow hand carves the same: {len(odd)} of {len(fast)}")  # places are whole pixels
+        browser.keys_with_control("z")
+        browser.wait("flexelView.clay.frame.surface === 0")
+        # beside the part the ball is lifted, and comes down again: still one act
+        posted, lifted = carve_by_hand(browser, begin, at(0.03, 0.046, 0.006), at(0.07, 0.046, 0.006), end)
+        expect(sum(line.startswith("carve from") for line in posted) == 2 and 0 < len(lifted), f"{posted}")
+        browser.keys_with_control("z")
+        browser.wait("flexelView.clay.frame.surface === 0")
+        # undone while the button is down, by Ctrl+Z and by Escape: the rest of the drag does nothing
+        for undo in (lambda: browser.keys_with_control("z"), lambda: browser.keys("\ue00c")):
+            browser.mouse(("move", *begin), ("down",), ("move", *middle))
+            browser.wait("flexelView.clay.frame.surface !== 0", 60)
+            undo()
+            browser.wait("flexelView.clay.frame.surface === 0 && !flexelView.clay.drag", 60)
+            browser.mouse(("move", *end), ("up",))
+            settle(browser)
+            expect(gone_elements(browser) == [] and not browser.run("return flexelView.clay.frame.said"), "nothing is carved")
+        expect_silence(browser)
+
+
+def test_undo_amid_a_drag_ends_it():
+    """The hand does not lead the tool before that was taken up earlier."""
+    bracket()
+    with clay("bracket.step", "--size", "5 mm", "--material", "PLA") as (url, _), chromium(WINDOW) as browser:
+        browser.open(url.geturl())
+        settle(browser)
+        browser.run("flexelView.clay.post('hold bracket/1', 'grab at 0.04 0.02 0.006 0.005', '0 0 0 -0.0005', 'stay')")
+        settle(browser)
+        before = browser.run("return flexelView.clay.frame.place")
+        choose_hand(browser, "pull")
+        browser.run("flexelView.controls.look('iso')")
+        for undo in (lambda: (browser.keys_with_control("z"), browser.wait("flexelView.clay.frame.redo"), browser.keys_with_control("z")), lambda: browser.keys("\ue00c")):
+            x, y = centre_of_face(browser, "bracket/2")  # what was bent is drawn smaller
+            browser.mouse(("move", x, y), ("down",))
+            browser.wait("flexelView.clay.drag?.base")
+            base = browser.run("return flexelView.clay.drag.base")
+            browser.mouse(("move", x, y + 10), ("move", x, y + 20))
+            browser.wait("flexelView.clay.frame.hand !== undefined")
+            undo()
+            browser.wait("flexelView.clay.frame.hand === undefined && !flexelView.clay.drag")
+            browser.mouse(("move", x, y + 40), ("move", x, y + 60), ("up",))
+            settle(browser)
+            place = browser.run("return flexelView.clay.frame.place")
+            expect(place[0] == before[0], f"the tool before is where it was: {place} {before}")
+            expect(len(place) == 1 or max(abs(a - b) for a, b in zip(place[1], base)) < 1e-9, f"and so is what the drag led: {place}")
+        expect_silence(browser)
+
+
 def test_a_ball_pushes_where_it_is_dragged_and_a_plate_by_keys():
     bracket()
     with clay("bracket.step", "--size", "5 mm", "--material", "PLA") as (url, _), chromium(WINDOW) as browser:
@@ -287,6 +376,7 @@ def test_parts_are_glued_and_painted():
         browser.run("document.getElementById('face-paint').click()")
         browser.wait("flexelView.clay.frame.painted.low === 'spring-steel'")
         choose_hand(browser, "paint")
+        expect("all of it" in browser.text("hands-said"), "a region is not painted, and the page says so")
         browser.choose("paint-with", "ABS")
         browser.click(*centre_of_face(browser, "high/2"))
         browser.wait("flexelView.clay.frame.painted.high === 'ABS'")

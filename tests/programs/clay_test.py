@@ -301,6 +301,81 @@ def test_carving_is_that_of_the_saved_scene():
             expect(said in frame["said"] and frame["undo"], f"{lines}: {frame['said']!r}")
 
 
+def test_carving_along_a_way_is_one_act_and_that_of_the_saved_scene():
+    bracket()
+    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _):
+        hand = Hand(url, 16 * "a")
+        hand.act("hold bracket/1", "grab face bracket/2")
+        whole = hand.act("0 0 0 -0.002")
+        way = [f"{0.02 + 0.002 * k} {0.02 + 0.012 * math.sin(0.4 * k)} 0.006" for k in range(21)]
+        hand.act(f"carve from {way[0]} 0.007")
+        for place in way[1:]:
+            hand.act(f"carve to {place}")
+        pieces = hand.act("stay")
+        expect(not pieces["said"] and len(gone(pieces)) > 15 and 0 < pieces["felt"][-1][2] < whole["felt"][-1][2], f"{pieces['said']} {len(gone(pieces))} {pieces['felt']}")
+        expect_same_run(url, pieces, ("--crack", "cap"))
+        expect(same(hand.act("undo")["positions"], whole["positions"]) and hand.last["surface"] == 0, "one act")
+        at_once = hand.act(f"carve from {way[0]} 0.007", *(f"carve to {place}" for place in way[1:]), "stay")
+        expect(gone(at_once) == gone(pieces) and same(at_once["positions"], pieces["positions"]), "it does not matter how fast it came")
+        expect(at_once["line"] == pieces["line"] + 21, f"places are counted as poses are: {at_once['line']} {pieces['line']}")
+        expect(saved(url, "scene.toml").count(b"[[event]]") == 1, "and one event")
+        hand.act("undo")
+        # the hand goes back on it
+        hand.act(f"carve from {way[0]} 0.007", f"carve to {way[9]}")
+        expect(same(hand.act("cancel")["positions"], whole["positions"]), "cancelled")
+        hand.act(f"hand 0 0 -0.004")
+        frame = hand.act("cancel", "cancel", "stay")
+        expect(frame["place"] == whole["place"] and frame["felt"][-1][2] > 0 and same(frame["positions"], whole["positions"]), f"a drag too, once: {frame['place']}")
+        # lifted between, over nothing, and where nothing is at all
+        frame = hand.act(f"carve from {way[0]} 0.007", f"carve to {way[2]}", "carve from 0.03 0.09 0.006 0.007", "carve to 0.06 0.09 0.006", f"carve from {way[18]} 0.007", "stay")
+        expect(not frame["said"] and 0 < len(gone(frame)) < len(gone(pieces)) and saved(url, "scene.toml").count(b"[[event]]") == 1, f"{frame['said']}")
+        expect_same_run(url, frame, ("--crack", "cap"))
+        hand.act("undo")
+        for lines, said in ((["carve from 1 1 1 0.001", "carve to 2 1 1", "stay"], "no element"), (["carve to 0 0 0"], "put the ball down first"),
+                            (["carve from 0.02 0.02 0.006 0.0001", "stay"], "no "), (["carve from 0.04 0.02 0.03 1"], "leaves nothing"),
+                            (["stay", f"carve from {way[0]} 0.007", *(200 * ["carve to 0.03 0.02 0.006"]), "stay"], "")):
+            frame = hand.act(*lines)
+            expect(said in frame["said"] and bool(said) == bool(frame["said"]), f"{lines[:3]}: {frame['said']!r}")
+        hand.act("undo")
+        expect(same(hand.last["positions"], whole["positions"]), "what was refused changed nothing")
+
+
+def test_carving_along_stops_where_nothing_would_hold_the_part():
+    bracket()
+    with clay("bracket.step", "--size", "4 mm", "--material", "PLA") as (url, _):
+        hand = Hand(url, 16 * "a")
+        hand.act("hold bracket/1", "grab face bracket/2")
+        whole = hand.act("0 0 0 -0.002")
+        hand.act("carve from 0.04 0.02 0.006 0.009")
+        some = hand.act("carve to 0.05 0.02 0.006")
+        refused = hand.act("carve to 0.079 0.002 0.003", "carve to 0.079 0.038 0.003")
+        expect("is not held and led as before" in refused["said"] and gone(refused) == gone(some), f"{refused['said']}")
+        after = hand.act("carve to 0.03 0.02 0.006", "carve from 0.03 0.02 0.006 0.009", "stay")
+        expect(gone(after) == gone(some) and "is not held" in after["said"], f"the rest of the way is passed over, and it still says why: {after['said']!r}")
+        expect_same_run(url, after, ("--crack", "cap"))
+        expect(same(hand.act("undo")["positions"], whole["positions"]), "one act")
+        # another client that takes the tool does not carve on
+        hand.act("carve from 0.04 0.02 0.006 0.009")
+        other = Hand(url, 16 * "b")
+        other.act("take", "carve from 0.055 0.02 0.006 0.009", "stay")
+        expect(gone(other.act("undo")) == gone(some) or len(gone(other.last)) > 0, "its act is its own")
+        expect(same(other.act("undo")["positions"], whole["positions"]), "and so is the first one's")
+
+
+def test_a_drag_that_does_not_follow_stays_one_act():
+    bracket()
+    with clay("bracket.step", "--size", "8 mm") as (url, _):
+        hand = Hand(url, 16 * "a")
+        hand.act("hold bracket/1", "grab face bracket/2")
+        frame = hand.act("0 -0.2 0 0")  # through the wall that holds it
+        expect("does not follow" in frame["said"], frame["said"])
+        expect("does not follow" in hand.act("stay")["said"], "which it still says when the hand has left")
+        hand.act("undo", "0 -0.2 0 0")
+        hand.act("0 0 0 -0.001")
+        frame = hand.act("undo")
+        expect(frame["place"] == [6 * [0]] and not frame["said"], f"all of the drag is undone: {frame['place']}")
+
+
 ON_TOP = "0.07 0.02 0.006 0 0 1"  # of the arm of the bracket, and where it looks
 
 
@@ -483,7 +558,8 @@ def test_what_cannot_be_is_said_and_harms_nothing():
         expect("does not follow" in frame["said"] and frame["residual"] <= 1e-8, f"it rests where it followed to: {frame['said']!r} {frame['residual']}")
         bad = ["", "hold x", "client 1", "client 0123456789abcdeF\n", "client 0123456789abcdef\nfly", "client 0123456789abcdef\nhand nan 0 0",
                "client 0123456789abcdef\nhand 1e9 0 0", "client 0123456789abcdef\ngrab at 0 0 0 -1",
-               "client 0123456789abcdef\ncarve at 0 0 0", "client 0123456789abcdef\ncarve at 0 0 0 0", "client 0123456789abcdef\nglue at 0 0 0 1", "client 0123456789abcdef\npaint steel", "client 0123456789abcdef\npaint  bracket",
+               "client 0123456789abcdef\ncarve at 0 0 0", "client 0123456789abcdef\ncarve at 0 0 0 0", "client 0123456789abcdef\ncarve from 0 0 0", "client 0123456789abcdef\ncarve from 0 0 0 0", "client 0123456789abcdef\ncarve to 0 0", "client 0123456789abcdef\ncarve to 0 0 nan",
+               "client 0123456789abcdef\ncancel now", "client 0123456789abcdef\nglue at 0 0 0 1", "client 0123456789abcdef\npaint steel", "client 0123456789abcdef\npaint  bracket",
                "client 0123456789abcdef\nglue at 0 0 0 1 nan", "client 0123456789abcdef\ncarve face bracket/1", "client 0123456789abcdef\nhold \x1b[31m",
                "client 0123456789abcdef\n0 1 2", "client 0123456789abcdef\nundo now", "client 0123456789abcdef\n" + 300 * "undo\n"]
         for content in bad:

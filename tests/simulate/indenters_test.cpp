@@ -245,6 +245,31 @@ TEST_P(PushedBy, TheTangentThatIsMadeIsTheOneThatIsStored) {
     EXPECT_LT((expected[e] - found[e]).norm(), 1e-9 * 2000 * kGumYoung * 0.01);
 }
 
+// The cells' tangent of one state with what the indenter adds in another.
+TEST_P(PushedBy, WhatItAddsIsMadeAnewAlone) {
+  Mechanics both(problem_, active_effects(scene_.effects, problem_), StiffnessStorage::stored);
+  const State first{any_vectors(body_.element_count(), 1e-3), 1},
+      then{any_vectors(body_.element_count(), 2e-3), 20};
+  both.assemble(first);
+  EXPECT_FALSE(both.renew_effects(then)) << "it is stored together with the rest";
+  if (problem_.models.at(0) == Model::springs) return;
+  Mechanics made(problem_, active_effects(scene_.effects, problem_), StiffnessStorage::made);
+  const std::vector<Vec3> x = any_vectors(body_.element_count(), 1);
+  std::vector<Vec3> before, after, added, taken;
+  made.assemble(first);
+  multiply(made.tangent(), x, before);
+  ASSERT_TRUE(made.renew_effects(then));
+  multiply(made.tangent(), x, after);
+  multiply(StoredMatrix(made.stiffness_of_effects(then)), x, added);
+  multiply(StoredMatrix(made.stiffness_of_effects(first)), x, taken);
+  double most = 0;
+  for (std::size_t e = 0; e < x.size(); ++e) {
+    EXPECT_LT((after[e] - before[e] - added[e] + taken[e]).norm(), 1e-9 * 2000 * kGumYoung * 0.01) << e;
+    most = std::max(most, (after[e] - before[e]).norm());
+  }
+  EXPECT_GT(most, 1e-3 * kGumYoung * 0.01);
+}
+
 INSTANTIATE_TEST_SUITE_P(Indenters, PushedBy,
                          ::testing::Values(ball(Vec3(0.021, 0.018, 0.032), 0.012, Vec3(0, 0, -5e-5)),
                                            ball(Vec3(0.021, 0.018, 0.032), 0.012, Vec3(0, 0, -5e-5)) +

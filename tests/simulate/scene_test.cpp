@@ -102,6 +102,11 @@ TEST(Scene, RefusesWithLineAndReason) {
       {"[[load]]\nwhere = 3\npressure = \"1 Pa\"\n", "s.toml:2", "\"where\""},
       {"[[load]]\nwhere = { sphere = { centre = [0, 0, 0], radius = 5 } }\npressure = \"1 Pa\"\n", "s.toml:2",
        "unit"},
+      {"[[load]]\nwhere = { sphere = { path = [[0, 0, 0]], radius = \"1 mm\" } }\npressure = \"1 Pa\"\n",
+       "s.toml:2", "two places or more"},
+      {"[[load]]\nwhere = { sphere = { path = [[0, 0, 0], [0, 0, 0]], centre = [0, 0, 0], radius = \"1 mm\" "
+       "} }\npressure = \"1 Pa\"\n",
+       "s.toml:2", "either \"centre\" or \"path\""},
       {"[[load]]\nwhere = { ball = 1 }\npressure = \"1 Pa\"\n", "s.toml:2", "unknown key \"ball\""},
       {"[[move]]\nwhere = \"xmin\"\n", "s.toml:1", "needs \"displacement\""},
       {"[[move]]\nwhere = \"xmin\"\ndisplacement = [\"free\", \"free\", \"free\"]\n", "s.toml:1",
@@ -196,6 +201,16 @@ TEST(Selection, NamesSidesRegionsAndTheirComplements) {
   const Selected ball =
       resolve(parse_where("{ sphere = { centre = [0, 0, 0], radius = \"1.01 m\" } }", ""), body);
   EXPECT_EQ(ball.elements.size(), 4u);
+  const Selected swept = resolve(
+      parse_where(
+          "{ sphere = { path = [[0, 0, 0], [0, \"1 m\", 0], [\"2 m\", \"1 m\", 0]], radius = \"0.1 m\" } }",
+          ""),
+      body);
+  for (std::uint32_t e = 0; e < body.element_count(); ++e) {
+    const Vec3& at = body.rest[e];
+    const bool inside = at.z() == 0 && (at.x() == 0 ? at.y() <= 1 : at.y() == 1 && at.x() <= 2);
+    EXPECT_EQ(std::count(swept.elements.begin(), swept.elements.end(), e), inside) << at.transpose();
+  }
   const Selected box =
       resolve(parse_where("{ box = { min = [0, 0, 0], max = [\"1 m\", \"1 m\", 0] } }", ""), body);
   EXPECT_EQ(box.elements.size(), 4u);

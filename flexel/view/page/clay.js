@@ -4,8 +4,10 @@ import {button, element} from "./elements.js";
 import {numberText} from "./numbers.js";
 import {readFrames} from "./stream.js";
 import {unpack} from "./unpack.js";
+import {CarvedWay} from "./way.js";
 
 const kFormats = ["stl", "obj", "3mf", "step"], kTurnPerPixel = 0.01, kCorners = 8;  // rad
+const kMostLines = 100;  // of a message
 
 const hex = bytes => [...bytes].map(byte => byte.toString(16).padStart(2, "0")).join("");
 
@@ -51,12 +53,12 @@ export class Clay {
     on("face-paint", "click", () => this.paint(this.partOfFace.get(faces.value)));
     on("stay", "click", () => this.post("release"));
     on("keep", "click", () => this.post("keep"));
-    on("undo", "click", () => this.post("undo"));
-    on("redo", "click", () => this.post("redo"));
+    for (const act of ["undo", "redo"]) on(act, "click", () => this.letGo(act));
     on("take", "click", () => this.post("take"));
     on("lead", "click", () => this.leadExactly());
     on("face", "change", () => this.aimAtFace());
     for (const act of ["carve", "glue"]) on(act, "click", () => this.change(act, this.triple("at-")));
+    on("carve-on", "click", () => this.carveOn());
     for (const each of document.querySelectorAll(".length-unit")) each.textContent = this.unit.name;
     this.by("ball").value = Number((2 * about.spacing / this.unit.factor).toPrecision(2));
     this.by("within").value = Number((about.spacing / this.unit.factor).toPrecision(2));
@@ -70,10 +72,18 @@ export class Clay {
       button(format.toUpperCase(), `Save the part as it is now, as ${format.toUpperCase()}`, () => this.save(`part.${format}`, `${about.stem}-bent.${format}`), this.by("save-part"));
     button("Scene", "Save the scene that does the same without hands", () => this.save("scene.tar", `${about.stem}-scene.tar`), this.by("save-part"));
     document.addEventListener("keydown", event => {
+      if (event.key === "Escape" && this.drag) return this.letGo("cancel");
       if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z" || /INPUT|SELECT|TEXTAREA/.test(event.target.tagName)) return;
       event.preventDefault();
-      this.post(event.shiftKey ? "redo" : "undo");
+      this.letGo(event.shiftKey ? "redo" : "undo");
     });
+  }
+
+  // The hand leaves, its button still down, and something is done: what it led is there no more, or another.
+  letGo(act) {
+    this.drag?.way?.stop();
+    this.drag = undefined;
+    this.post(act);
   }
 
   say(text, how = "faint") { Object.assign(this.by("hands-said"), {textContent: text, className: how}); }
@@ -94,6 +104,7 @@ export class Clay {
     const pushes = name => name.startsWith("push-"), along = this.by("along");
     if (pushes(mode) && along.value === "any") along.value = "in";
     if (!pushes(mode) && along.value === "in") along.value = "any";
+    if (mode === "paint") this.say("A part has one material throughout: a click paints all of it.");
     this.mode = mode;
   }
 
@@ -110,8 +121,17 @@ export class Clay {
 
   // Carves or glues in the ball about a place at rest.
   change(act, rest) {
+    if (act === "carve") this.carved = rest;
     const ball = `${act} at ${rest.join(" ")} ${this.radius}`;
     this.post(act === "glue" ? `${ball} ${Math.max(1e-9, this.length("within"))}` : ball);
+  }
+
+  // Straight on from where a ball was carved out last.
+  carveOn() {
+    if (!this.carved) return this.say("Carve a ball first: the way begins there.", "warning");
+    const [from, to] = [this.carved, this.triple("at-")];
+    this.post(`carve from ${from.join(" ")} ${this.radius}`, `carve to ${to.join(" ")}`, "stay");
+    this.carved = to;
   }
 
   // Puts a ball or a plate where it touches a place as it is now.
@@ -158,7 +178,7 @@ export class Clay {
     this.busy = true;
     try {
       while (this.waiting.length > 0) {
-        const acts = this.waiting.splice(0), lines = acts.map(act => act.line);
+        const acts = this.waiting.splice(0, kMostLines), lines = acts.map(act => act.line);
         const answer = await fetch("act", {method: "POST", body: [`client ${this.client}`, ...lines].join("\n")});
         const text = await answer.text();
         if (!answer.ok) this.say(text.trim(), "warning");
@@ -193,7 +213,8 @@ export class Clay {
     const rest = this.panel.restOf(hit), name = this.panel.faceName(this.shape.face[hit.triangle]);
     if (this.mode === "hold") return name.odd ? this.say(`${name.text} is no face that has a name`, "warning") : this.toggleHold(name.text);
     if (this.mode === "paint") return this.paint(this.panel.partName(this.shape.face[hit.triangle]));
-    if (this.mode === "carve" || this.mode === "glue") return this.change(this.mode, rest);
+    if (this.mode === "glue") return this.change("glue", rest);
+    if (this.mode === "carve") return this.beginToCarve(event, at);
     const pushes = this.mode.startsWith("push-") && this.mode.slice(5), byFace = !pushes && this.by("takes").value === "face";
     if (byFace && name.odd) return this.say(`${name.text} is no face that has a name`, "warning");
     this.picture.canvas.setPointerCapture(event.pointerId);
@@ -203,17 +224,37 @@ export class Clay {
     else this.post(byFace ? `grab face ${name.text}` : `grab at ${rest.join(" ")} ${this.radius}`);
   }
 
+  beginToCarve(event, at) {
+    this.picture.canvas.setPointerCapture(event.pointerId);
+    this.drag = {pointer: event.pointerId, way: new CarvedWay(this.picture, this.panel, this.radius, line => this.post(line))};
+    this.drag.way.add(...at);
+  }
+
   move(event) {
     if (!this.drag || event.pointerId !== this.drag.pointer) return;
     event.stopPropagation();
+    if (this.drag.way) return this.carveAlong(event);
     this.drag.now = this.place(event);
     this.drag.pressure = event.pressure;
     this.follow();
   }
 
+  // A browser tells places of a fast hand together.
+  carveAlong(event) {
+    const all = event.getCoalescedEvents?.() ?? [];
+    for (const each of all.length > 0 ? all : [event]) this.drag.way.add(...this.place(each));
+    this.picture.drawOver(this.picture.layout);
+  }
+
   up(event) {
     if (!this.drag || event.pointerId !== this.drag.pointer) return;
     event.stopPropagation();
+    if (this.drag.way) {
+      this.carved = this.drag.way.end();
+      this.post("stay");
+      this.drag = undefined;
+      return this.picture.redraw();
+    }
     this.drag.done = true;
     this.follow();
   }
@@ -257,7 +298,7 @@ export class Clay {
       this.drag.base = frame.place.at(-1);
       this.follow();
     }
-    if (this.drag && !this.drag.base && frame.said) this.drag = undefined;
+    if (this.drag && !this.drag.base && !this.drag.way && frame.said) this.drag = undefined;
     const text = frame.said || this.hint;
     if (text !== this.told) this.say(text, frame.said ? "warning" : "faint");
     this.told = text;
@@ -282,15 +323,17 @@ export class Clay {
         if (!answer.ok && number !== this.frame.surface) continue;
         if (answer.status === 404) break;  // another has come; the frame that says so is on its way
         if (!answer.ok) throw new Error(await answer.text());
-        this.panel.replaceSurface(await unpack(new Uint8Array(await answer.arrayBuffer())));
+        const pack = await unpack(new Uint8Array(await answer.arrayBuffer()));
+        if (number !== this.frame.surface) continue;
+        this.panel.replaceSurface(pack);
         this.shape = this.panel.shape;
         this.carriedRest = undefined;
         this.surface = number;
+        this.bend(this.frame.positions);  // at once: until then its points lie nowhere, and no click finds it
       }
       this.controls.probes.clear();
       this.panel.setInk(this.picture.state.theme);
       this.facePlaces = this.placesOfFaces();
-      this.fresh = this.frame.positions;
       this.askToShow();
     } catch (error) {
       this.say(`what was carved is not shown (${error.message.trim()})`, "warning");
@@ -426,6 +469,7 @@ export class Clay {
   draw({context, em, theme}) {
     const {frame} = this;
     if (!frame || !this.facePlaces) return;
+    if (this.drag?.way) this.drawWay(context, theme);
     context.font = `${em}px system-ui, sans-serif`;
     context.lineWidth = 2;
     context.textAlign = "left";
@@ -448,6 +492,19 @@ export class Clay {
       this.label(context, theme, this.forceText(t), x + 0.8 * em, y - 0.8 * em);
       if (leads) this.drawSpring(context, [x, y], this.worldPoint(middle.map((m, k) => m + frame.hand[k])), em);
     });
+  }
+
+  // Where a ball carves that the hand leads, as wide as it is.
+  drawWay(context, theme) {
+    const {pixels, radius} = this.drag.way;
+    context.save();
+    Object.assign(context, {globalAlpha: 0.25, strokeStyle: theme.ink, lineCap: "round", lineJoin: "round",
+                            lineWidth: 2 * radius * this.picture.pixelsPerMetre(this.panel, this.picture.layout[0])});
+    context.beginPath();
+    context.moveTo(...pixels[0]);
+    for (const at of pixels) context.lineTo(...at);
+    context.stroke();
+    context.restore();
   }
 
   // Of a ball, or of a plate's face as it is turned.

@@ -262,10 +262,13 @@ export class Panel {
     return {text: `${part.text}/${taken ? "#" : ""}${number}`, odd: part.odd};
   }
 
+  // The part as it is drawn now, for hit() to go by whatever becomes of it.
+  get still() { return {shape: this.shape, position: this.after.position.array.slice()}; }
+
   // The first triangle on the way from `origin` (about the centre) along `direction`: {triangle, weights, ...}. `rest`: of the part
-  // as it was.
-  hit(origin, direction, rest) {
-    const {triangles} = this.shape, p = (rest ? this.before : this.after).position.array, {plane, cut} = this.clip;
+  // as it was; `still`: of that.
+  hit(origin, direction, rest, still) {
+    const {triangles} = (still ?? this).shape, p = still?.position ?? (rest ? this.before : this.after).position.array, {plane, cut} = this.clip;
     const [ox, oy, oz] = origin.toArray(), [dx, dy, dz] = direction.toArray();
     let best;
     for (let t = 0; t < triangles.length; t += 3) {
@@ -300,10 +303,10 @@ export class Panel {
     const [a, b, c] = [0, 1, 2].map(k => new THREE.Vector3().fromArray(this.after.position.array, 3 * this.shape.triangles[3 * triangle + k]));
     return b.sub(a).cross(c.sub(a)).normalize();
   }
-  mean(triangle, weights, of) {
-    return weights.reduce((sum, weight, k) => sum + weight * of(this.shape.triangles[3 * triangle + k]), 0);
+  mean(triangle, weights, of, {triangles} = this.shape) {
+    return weights.reduce((sum, weight, k) => sum + weight * of(triangles[3 * triangle + k]), 0);
   }
-  restOf({triangle, weights}) { return [0, 1, 2].map(c => this.mean(triangle, weights, point => this.shape.restOf(point)[c])); }
+  restOf({triangle, weights}, shape = this.shape) { return [0, 1, 2].map(c => this.mean(triangle, weights, point => shape.restOf(point)[c], shape)); }
   displacementOf({triangle, weights}, frame) {
     return [0, 1, 2].map(c => this.mean(triangle, weights, point => this.shape.displacementOf(point, frame)[c]));
   }

@@ -253,15 +253,15 @@ export class Picture {
     return [x + (at.x + 1) / 2 * width, y + (1 - at.y) / 2 * height];
   }
 
-  // The panel under a place, and what is there of it: {panel, triangle, weights}.
-  pick(x, y) {
+  // The panel under a place, and what is there of it: {panel, triangle, weights}. `still`: as Panel.hit() has it.
+  pick(x, y, still) {
     const k = this.layout.findIndex(room => x >= room.x && x < room.x + room.width && y >= room.y && y < room.y + room.height);
     if (k < 0) return undefined;
     const panel = this.panels[k], room = this.layout[k], {eye} = this.view.axes;
     this.view.apply(panel.camera, this.radiusOf(panel), room.width / room.height);
     const from = new THREE.Vector3((x - room.x) / room.width * 2 - 1, 1 - (y - room.y) / room.height * 2, -1).unproject(panel.camera);
     const wiped = this.state.before === "wipe" && panel.shape.moved && x < room.x + this.state.wipe * room.width;
-    const hit = panel.hit(from, eye.clone().negate(), wiped);
+    const hit = panel.hit(from, eye.clone().negate(), wiped, still);
     return hit && {panel, ...hit};
   }
 

@@ -41,7 +41,7 @@ export class FrameReader {
     this.pieces = [bytes.subarray(whole)];
     this.size = bytes.length - whole;
     if (this.header) return line;
-    if (line["flexel-live"] !== 1 || line.clay !== 3) throw new Error("this page and its flexel clay are of different versions: load it again");
+    if (line["flexel-live"] !== 1 || line.clay !== 4) throw new Error("this page and its flexel clay are of different versions: load it again");
     this.header = line;
     return this.next();
   }
