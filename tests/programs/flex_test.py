@@ -79,8 +79,10 @@ def test_ends_that_turn_by_less_than_half_are_a_failure():
 
 def spindle(tip):
     """STL of a round bar along x, 8 mm thick, whose far end narrows to `tip` mm."""
-    rings = [[(x, r * math.cos(math.pi * i / 6), r * math.sin(math.pi * i / 6)) for i in range(12)] for x, r in ((0, 4), (52, 4), (60, tip / 2))]
-    triangles = [[a[0], a[i + 1], a[i]] for a in rings[:1] for i in range(1, 11)] + [[a[0], a[i], a[i + 1]] for a in rings[-1:] for i in range(1, 11)]
+    round_at = lambda x, r: [(x, r * math.cos(math.pi * i / 6), r * math.sin(math.pi * i / 6)) for i in range(12)]
+    rings = [round_at(x, r) for x, r in ((0, 4), (52, 4), (60, tip / 2))]
+    near, far = rings[0], rings[-1]
+    triangles = [[near[0], near[i + 1], near[i]] for i in range(1, 11)] + [[far[0], far[i], far[i + 1]] for i in range(1, 11)]
     for a, b in zip(rings, rings[1:]):
         for i in range(12):
             j = (i + 1) % 12
