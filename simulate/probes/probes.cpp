@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <iterator>
 #include <limits>
 #include <optional>
 
@@ -39,26 +38,75 @@ void add(const InterpolationWeights& carrier, std::vector<std::pair<std::uint32_
     weights.emplace_back(carrier.elements[a], carrier.weights[a]);
 }
 
-// The voxel nearest to a probe.
-struct Found {
-  double distance = 1e300;  // m, from the voxel that is nearest
-  double spacing = 0;       // m, of its part
-  std::uint32_t part = 0;
-  std::uint32_t cell = 0;  // of a corner-placed part
-};
-
-bool is_stray(const Problem& problem, std::uint32_t cell) {
-  return cell < problem.stray_cell.size() && problem.stray_cell[cell];
+bool is_stray(const std::vector<std::uint8_t>& stray, std::uint32_t which) {
+  return which < stray.size() && stray[which];
 }
 
-// Cells whose voxels are as near to the point as the nearest.
-std::vector<std::uint32_t> nearest_cells(const Problem& problem, const Found& found, const Vec3& point) {
+// m, of a point from the nearest voxel of a part that a cell, or an element at its centre, is of.
+double distance_from_part(const Problem& problem, const Part& part, const Vec3& point) {
+  const Body& body = problem.body;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c)
+    if (!is_stray(problem.stray_cell, c))
+      least = std::min(least, distance_from_voxel(part.lattice, lowest_corner(body, c), point));
+  if (part.placement == Placement::corner) return least;
+  for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
+    if (!is_stray(problem.stray_element, e))
+      least = std::min(least, distance_from_voxel(part.lattice, body.lattice_index[e], point));
+  return least;
+}
+
+// The polygon nearest to the point of those that count; of polygons that touch there one on whose inner side it is.
+template <class Counts>
+std::optional<std::uint32_t> nearest_polygon(const Surface& surface, double same, const Vec3& point,
+                                             const Counts& counts) {
+  const Triangles triangles = triangulate(surface);
+  double least = std::numeric_limits<double>::infinity();
+  std::optional<std::uint32_t> nearest;
+  for (std::size_t t = 0; t < triangles.polygon.size(); ++t) {
+    if (!counts(triangles.polygon[t])) continue;
+    const auto at = [&](std::size_t corner) { return surface.vertices[triangles.corners[t][corner]]; };
+    const Vec3 away = point - nearest_of_triangle(point, at(0), at(1), at(2));
+    const bool outside = away.dot((at(1) - at(0)).cross(at(2) - at(0))) > 0;
+    const double distance = away.norm() + (outside ? same : 0);
+    if (!(distance < least)) continue;
+    least = distance;
+    nearest = triangles.polygon[t];
+  }
+  return nearest;
+}
+
+// The part whose voxels are nearest to the point; of several the one whose surface is. Throws InputError: further than a
+// spacing from all.
+std::uint32_t part_of_point(const Probe& probe, const Problem& problem) {
+  const Body& body = problem.body;
+  std::vector<double> distance;
+  for (const Part& part : body.parts) distance.push_back(distance_from_part(problem, part, *probe.at));
+  const auto nearest =
+      static_cast<std::uint32_t>(std::min_element(distance.begin(), distance.end()) - distance.begin());
+  const double spacing = body.parts[nearest].lattice.spacing.maxCoeff(), same = kSame * spacing;
+  if (!(distance[nearest] <= spacing))
+    throw InputError(probe.origin,
+                     fmt::format("probe \"{}\" lies {} outside the matter; move it onto the part", probe.name,
+                                 human_length(distance[nearest])));
+  const auto as_near = [&](std::uint32_t part) { return distance[part] <= distance[nearest] + same; };
+  std::size_t count = 0;
+  for (std::uint32_t part = 0; part < distance.size(); ++part) count += as_near(part) ? 1 : 0;
+  if (count == 1) return nearest;
+  const auto polygon = nearest_polygon(body.surface, same, *probe.at, [&](std::uint32_t each) {
+    return as_near(body.surface.polygon_part(each));
+  });
+  return polygon ? body.surface.polygon_part(*polygon) : nearest;
+}
+
+// Cells of a part whose voxels are as near to the point as the nearest.
+std::vector<std::uint32_t> nearest_cells(const Problem& problem, const Part& part, const Vec3& point) {
+  const double least = distance_from_part(problem, part, point) + kSame * part.lattice.spacing.maxCoeff();
   std::vector<std::uint32_t> cells;
-  for (const Part& part : problem.body.parts)
-    for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c)
-      if (!is_stray(problem, c) && distance_from_voxel(part.lattice, lowest_corner(problem.body, c), point) <=
-                                       found.distance + kSame * found.spacing)
-        cells.push_back(c);
+  for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c)
+    if (!is_stray(problem.stray_cell, c) &&
+        distance_from_voxel(part.lattice, lowest_corner(problem.body, c), point) <= least)
+      cells.push_back(c);
   return cells;
 }
 
@@ -79,78 +127,28 @@ std::vector<std::optional<std::uint32_t>> bounded_cells(const Body& body,
   return bounds;
 }
 
-// The polygon nearest to the point of those that count; of polygons that touch there one on whose inner side it is.
-template <class Counts>
-std::optional<std::uint32_t> nearest_polygon(const Surface& surface, const Triangles& triangles,
-                                             double spacing, const Vec3& point, const Counts& counts) {
-  double least = std::numeric_limits<double>::infinity();
-  std::optional<std::uint32_t> nearest;
-  for (std::size_t t = 0; t < triangles.polygon.size(); ++t) {
-    if (!counts(triangles.polygon[t])) continue;
-    const auto at = [&](std::size_t corner) { return surface.vertices[triangles.corners[t][corner]]; };
-    const Vec3 away = point - nearest_of_triangle(point, at(0), at(1), at(2));
-    const bool outside = away.dot((at(1) - at(0)).cross(at(2) - at(0))) > 0;
-    const double distance = away.norm() + (outside ? kSame * spacing : 0);
-    if (!(distance < least)) continue;
-    least = distance;
-    nearest = triangles.polygon[t];
-  }
-  return nearest;
-}
-
-// Of these cells the one whose matter the point is of.
-std::uint32_t cell_of_matter(const Body& body, std::vector<std::uint32_t> cells, double spacing,
-                             const Vec3& point) {
-  const Triangles triangles = triangulate(body.surface);
-  const auto cells_of = [&](std::uint32_t part) {
-    std::vector<std::uint32_t> own;
-    std::copy_if(cells.begin(), cells.end(), std::back_inserter(own), [&](std::uint32_t c) {
-      return c >= body.parts[part].cell_begin && c < body.parts[part].cell_end;
-    });
-    return own;
-  };
-  std::vector<std::uint8_t> has(body.parts.size(), 0);
-  for (std::uint32_t part = 0; part < has.size(); ++part) has[part] = !cells_of(part).empty();
-  const auto polygon = nearest_polygon(body.surface, triangles, spacing, point, [&](std::uint32_t each) {
-    return has[body.surface.polygon_part(each)] != 0;
-  });
-  if (polygon) cells = cells_of(body.surface.polygon_part(*polygon));
+// The cell of a part whose matter the point is of.
+std::uint32_t cell_of_point(const Problem& problem, const Part& part, const Vec3& point) {
+  const Body& body = problem.body;
+  const std::vector<std::uint32_t> cells = nearest_cells(problem, part, point);
   if (cells.size() == 1) return cells.front();
   const std::vector<std::optional<std::uint32_t>> bounds = bounded_cells(body, cells);
-  const auto bounding = nearest_polygon(body.surface, triangles, spacing, point,
+  const auto bounding = nearest_polygon(body.surface, kSame * part.lattice.spacing.maxCoeff(), point,
                                         [&](std::uint32_t each) { return bounds[each].has_value(); });
   return bounding ? *bounds[*bounding] : cells.front();
 }
 
 ProbePoints place_point(const Probe& probe, const Problem& problem) {
   const Body& body = problem.body;
-  Found found;
-  for (std::uint32_t p = 0; p < body.parts.size(); ++p) {
-    const Part& part = body.parts[p];
-    const double spacing = part.lattice.spacing.maxCoeff();
-    for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c) {
-      const double distance = distance_from_voxel(part.lattice, lowest_corner(body, c), *probe.at);
-      if (distance < found.distance && !is_stray(problem, c)) found = {distance, spacing, p, c};
-    }
-    if (part.placement == Placement::corner) continue;
-    for (std::uint32_t e = part.element_begin; e < part.element_end; ++e) {
-      const double distance = distance_from_voxel(part.lattice, body.lattice_index[e], *probe.at);
-      if (distance < found.distance && !(e < problem.stray_element.size() && problem.stray_element[e]))
-        found = {distance, spacing, p, 0};
-    }
-  }
-  if (!(found.distance <= found.spacing))
-    throw InputError(probe.origin,
-                     fmt::format("probe \"{}\" lies {} outside the matter; move it onto the part", probe.name,
-                                 human_length(found.distance)));
+  const std::uint32_t number = part_of_point(probe, problem);
+  const Part& part = body.parts[number];
   ProbePoints points{probe.name, *probe.at, {}};
-  if (body.parts[found.part].placement == Placement::corner) {
-    const std::vector<std::uint32_t> cells = nearest_cells(problem, found, *probe.at);
-    points.cell = cells.size() > 1 ? cell_of_matter(body, cells, found.spacing, *probe.at) : found.cell;
+  if (part.placement == Placement::corner) {
+    points.cell = cell_of_point(problem, part, *probe.at);
     add(cell_carrier(body, cell_point(body, *points.cell, *probe.at)), points.weights);
   } else {
     // Within a spacing of a voxel there is an element within two.
-    const auto element = nearest_element(problem, found.part, *probe.at, Vec3::Zero());
+    const auto element = nearest_element(problem, number, *probe.at, Vec3::Zero());
     add(with_gradient(problem, {{*element}, {1}, 1}, *probe.at), points.weights);
   }
   return points;

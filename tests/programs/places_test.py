@@ -61,7 +61,7 @@ def test_a_box_from_plane_to_plane_holds_both():
 def test_a_probe_is_of_the_part_that_it_lies_in():
     """The last cells of the left part reach into the right one."""
     boxes("two.stl", ("left", 0, 29), ("right", 29.3, 60))
-    for options, model in ((), "cells"), (("--moments",), "quadratic"):
+    for options, model in ((), "cells"), (("--moments",), "quadratic"), ((), "springs"), (("--placement", "centre"), "paper"):
         expect_ok(run("flexel-voxelize", "two.stl", "--size", "2.5 mm", "--align", "none", "-o", "two.vtu", *options))
         probes = probe("left", 28.9, 10, 5) + probe("first", 29.31, 10, 5) + probe("second", 29.5, 10, 5) + probe("third", 32.5, 10, 5)
         found = summary(f'model = "{model}"\n' + LOAD + probes, "two.vtu")["probes"]
