@@ -18,8 +18,8 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kHeld = 0.99, kPartlyHeld = 0.1;  // of a load
-constexpr double kAtOdds = 0.005;                  // of a surface that is held or led
+constexpr double kHeld = 0.99, kPartlyHeld = 0.1;  // of a load, of a surface that is held or led
+constexpr double kAtOdds = 0.005;                  // likewise: told from here on
 constexpr double kOffAxis = 10;                    // degrees
 constexpr double kCarries = 1e-6;                  // weight of an element
 
@@ -178,7 +178,7 @@ std::uint8_t axes_at_odds(const Tie& one, const Tie& other) {
 
 // A surface that is held or led, on elements that are led elsewhere: neither gets its way. (What is led and held by the same
 // kind of selection is refused where ties are made.)
-void check_at_odds(const Tie& surface, const Tie& elements, const Body& body) {
+void check_at_odds(const Tie& surface, const Tie& elements, const Body& body, Progress& progress) {
   const std::uint8_t odds = axes_at_odds(surface, elements);
   if (odds == 0 || surface.link || elements.link) return;
   const HeldMasks held = held_masks({elements}, body);
@@ -189,14 +189,16 @@ void check_at_odds(const Tie& surface, const Tie& elements, const Body& body) {
       if ((held_under(held, body, p, middle) & odds) != 0) both += area;
       whole += area;
     });
-  if (both > kAtOdds * whole)
-    throw InputError(
-        surface.origin,
-        fmt::format("{} \"{}\": a {} of elements {} {} of the place that {}; give the {} other "
-                    "elements or axes",
-                    surface.is_move ? "move" : "fix", surface.name, elements.is_move ? "[[move]]" : "[[fix]]",
-                    elements.is_move ? "leads" : "holds", human_share(both / whole),
-                    surface.is_move ? "is to move" : "is held", elements.is_move ? "move" : "fix"));
+  if (!(both > kAtOdds * whole)) return;
+  const std::string what = fmt::format(
+      "{} \"{}\": a {} of elements {} {} of the place that {}", surface.is_move ? "move" : "fix",
+      surface.name, elements.is_move ? "[[move]]" : "[[fix]]", elements.is_move ? "leads" : "holds",
+      human_share(both / whole), surface.is_move ? "is to move" : "is held");
+  const std::string advice =
+      fmt::format("give the {} other elements or axes", elements.is_move ? "move" : "fix");
+  if (both > kPartlyHeld * whole) throw InputError(surface.origin, what + "; " + advice);
+  progress.warn(fmt::format("{}: {}, and neither gets its way there, at forces that mean nothing; {}",
+                            surface.origin, what, advice));
 }
 
 // Degrees between the mean normal of a side's polygons and its axis.
@@ -224,7 +226,7 @@ void check_actions(const Scene& scene, const Body& body, Progress& progress) {
   if (!scene.run.time) refuse_courses(scene);
   const std::vector<Tie>& ties = scene.get<Supports>().ties;
   for (const Tie& surface : ties)
-    for (const Tie& elements : ties) check_at_odds(surface, elements, body);
+    for (const Tie& elements : ties) check_at_odds(surface, elements, body, progress);
   if (scene.get<Loads>().loads.empty()) return;
   const HeldMasks held = held_masks(ties, body);
   for (const Load& load : scene.get<Loads>().loads) {
