@@ -78,9 +78,8 @@ double resultant(const simulate::SimulateResult& result, const simulate::Scene& 
   if (turned) return 0;  // a couple over an angle is no force over a displacement
   if (!driven) return sum.norm();
   sum.setZero();
-  for (const simulate::Tie& tie : scene.get<simulate::Supports>().ties)
-    for (const simulate::Reaction& reaction : result.reactions)
-      if (tie.is_move && reaction.name == tie.name) sum += reaction.force;
+  for (const simulate::Reaction& reaction : result.reactions)
+    if (reaction.is_move) sum += reaction.force;
   return sum.norm();
 }
 

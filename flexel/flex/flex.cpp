@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <numbers>
+#include <optional>
 
 #include "base/error.h"
 #include "base/math/dense.h"
@@ -53,28 +55,74 @@ simulate::Selection side(const std::string& name, const Flex& flex) {
   return simulate::parse_where(name, flex.bends ? "--bend" : "--twist");
 }
 
-// (vertices of these polygons) The rotation of the rigid motion nearest to theirs.
+// Points at rest and now, m.
+struct Moved {
+  std::vector<Vec3> rest, now;
+};
+
+// The rotation of the rigid motion nearest to theirs; nothing where they lie on a line.
+std::optional<Mat3> turn_of(const Moved& points) {
+  constexpr double kOneLine = 1e-9;
+  Vec3 middle = Vec3::Zero(), moved = Vec3::Zero();
+  for (std::size_t i = 0; i < points.rest.size(); ++i) {
+    middle += points.rest[i] / static_cast<double>(points.rest.size());
+    moved += points.now[i] / static_cast<double>(points.rest.size());
+  }
+  Mat3 product = Mat3::Zero();
+  for (std::size_t i = 0; i < points.rest.size(); ++i)
+    product += (points.now[i] - moved) * (points.rest[i] - middle).transpose();
+  const NearestRotation nearest = nearest_rotation(product);
+  if (!(nearest.values[1] > kOneLine * nearest.values[0])) return std::nullopt;
+  return nearest.rotation;
+}
+
+// Of the vertices of these polygons.
 Mat3 turn_of_side(const Body& body, const simulate::Selected& selected,
                   const std::vector<Vec3>& displacement) {
   std::vector<std::uint8_t> taken(body.surface.vertices.size(), 0);
   for (const std::uint32_t p : selected.polygons)
     for (const std::uint32_t v : body.surface.polygon(p)) taken[v] = 1;
-  Vec3 middle = Vec3::Zero(), moved = Vec3::Zero();
-  double count = 0;
+  Moved side;
   for (std::size_t v = 0; v < taken.size(); ++v)
     if (taken[v]) {
-      middle += body.surface.vertices[v];
-      moved += body.surface.vertices[v] + displacement[v];
-      ++count;
+      side.rest.push_back(body.surface.vertices[v]);
+      side.now.push_back(body.surface.vertices[v] + displacement[v]);
     }
-  middle /= count;
-  moved /= count;
-  Mat3 product = Mat3::Zero();
-  for (std::size_t v = 0; v < taken.size(); ++v)
-    if (taken[v])
-      product += (body.surface.vertices[v] + displacement[v] - moved) *
-                 (body.surface.vertices[v] - middle).transpose();
-  return nearest_rotation(product).rotation;
+  return turn_of(side).value_or(Mat3::Identity());
+}
+
+// rad, about the axis that the ends turn about, from one of two rotations to the other; under half a turn.
+double turn_between(const Mat3& one, const Mat3& other, const FlexFrame& frame) {
+  const Eigen::AngleAxisd between(Mat3(one.transpose() * other));
+  return between.angle() * between.axis().dot(frame.axis);
+}
+
+// rad, whole turns included: summed up over slices of the matter from the held end to the other.
+double turn_along(const Mat3& held, const Mat3& led, const FlexFrame& frame, const Body& body) {
+  constexpr double kSlice = 1.5;  // spacings
+  constexpr std::size_t kMostSlices = 200;
+  const Box box = bounding_box(body.rest);
+  const double from = box.min[frame.along], way = box.max[frame.along] - from;
+  double spacing = 0;
+  for (const Part& part : body.parts) spacing = std::max(spacing, part.lattice.spacing.maxCoeff());
+  std::vector<Moved> slices(
+      std::clamp(static_cast<std::size_t>(way / (kSlice * spacing)), std::size_t{1}, kMostSlices));
+  const auto count = static_cast<double>(slices.size());
+  for (std::size_t e = 0; e < body.rest.size(); ++e) {
+    const double share = (body.rest[e][frame.along] - from) / way;
+    Moved& slice = slices[static_cast<std::size_t>(std::clamp(share * count, 0.0, count - 0.5))];
+    slice.rest.push_back(body.rest[e]);
+    slice.now.push_back(body.position[e]);
+  }
+  double sum = 0;
+  Mat3 last = held;
+  for (const Moved& slice : slices) {
+    const std::optional<Mat3> turn = slice.rest.empty() ? std::nullopt : turn_of(slice);
+    if (!turn) continue;
+    sum += turn_between(last, *turn, frame);
+    last = *turn;
+  }
+  return sum + turn_between(last, led, frame);
 }
 
 }  // namespace
@@ -168,10 +216,7 @@ double measure_flex(const Flex& flex, const Body& body, const std::vector<Vec3>&
   const FlexFrame frame = flex_frame(flex, body.surface);
   const Mat3 held = turn_of_side(body, resolve(side(frame.held, flex), body), displacement);
   const Mat3 led = turn_of_side(body, resolve(side(frame.led, flex), body), displacement);
-  const Eigen::AngleAxisd between(Mat3(held.transpose() * led));
-  const double turned = between.angle() * between.axis().dot(frame.axis);
-  const double whole = 2 * std::numbers::pi;
-  return turned + whole * std::round((flex.angle - turned) / whole);
+  return turn_along(held, led, frame, body);
 }
 
 bool flex_failed(const Flex& flex, const FlexAnswer& answer) {

@@ -14,6 +14,7 @@
 #include <memory>
 #include <numeric>
 #include <optional>
+#include <tuple>
 
 #include "base/bucket.h"
 #include "base/error.h"
@@ -139,17 +140,24 @@ void look_under(const Body& body, std::size_t p, const Vec3& point, const std::v
 
 // Of the cells around `element`, the nearest element to `point`: the one that the point is in, or nearest to;
 // where there is none, the element itself.
-VertexAnchor anchor_near_element(const Body& body, const Buckets<std::uint32_t>& cells_of, std::uint32_t part,
-                                 std::uint32_t element, const Vec3& point, const Vec3& middle) {
+Home home_near_element(const Body& body, const Buckets<std::uint32_t>& cells_of, std::uint32_t part,
+                       std::uint32_t element, const Vec3& point, const Vec3& middle) {
   const Lattice& lattice = body.parts[part].lattice;
+  Home home;
   if (body.parts[part].placement == Placement::corner && !cells_of.begin.empty()) {
-    Home home;
     const Vec3 u = lattice.to_lattice(point);
     for (std::uint32_t i = cells_of.begin[element]; i < cells_of.begin[element + 1]; ++i)
       consider(body, cells_of.values[i], u, lattice.spacing, middle, home);
-    if (home.squared_distance < kUnreached) return home.anchor;
+    if (home.squared_distance < kUnreached) return home;
   }
-  return anchor_at_element(body, part, element, point, middle);
+  Vec3 beside =
+      lattice.to_lattice(point) -
+      Vec3(body.lattice_index[element][0], body.lattice_index[element][1], body.lattice_index[element][2]);
+  if (body.parts[part].placement == Placement::centre)  // of its voxel
+    beside = (-beside).cwiseMax(beside - Vec3::Ones()).cwiseMax(0.0);
+  home.squared_distance = beside.cwiseProduct(lattice.spacing).squaredNorm();
+  home.anchor = anchor_at_element(body, part, element, point, middle);
+  return home;
 }
 
 class AnchorFinder {
@@ -318,18 +326,21 @@ class AnchorFinder {
     const Vec3& point = body_.surface.vertices[v];
     if (first_polygon_[v] != kNone) {
       const std::uint32_t part = part_of(v);
-      return anchor_near_element(body_, cells_of_, part, grids_[part]->nearest(point), point, middle_[part]);
+      return home_near_element(body_, cells_of_, part, grids_[part]->nearest(point), point, middle_[part])
+          .anchor;
     }
-    std::uint32_t best_part = 0, best = kNone;
+    // of the part in whose cells it is, or whose cells are nearest; of several the one with the nearest element
+    Home best;
+    double beside = kUnreached;  // m^2, of the best from its element
     for (std::uint32_t part = 0; part < grids_.size(); ++part) {
       const std::uint32_t element = grids_[part]->nearest(point);
-      if (best != kNone &&
-          (body_.rest[element] - point).squaredNorm() >= (body_.rest[best] - point).squaredNorm())
-        continue;
-      best = element;
-      best_part = part;
+      const Home home = home_near_element(body_, cells_of_, part, element, point, middle_[part]);
+      const double from_element = (body_.rest[element] - point).squaredNorm();
+      if (std::tie(home.squared_distance, from_element) >= std::tie(best.squared_distance, beside)) continue;
+      best = home;
+      beside = from_element;
     }
-    return anchor_near_element(body_, cells_of_, best_part, best, point, middle_[best_part]);
+    return best.anchor;
   }
 
   const Body& body_;

@@ -25,7 +25,7 @@ struct Binding {
 // the vertex name (Body::surface_cells): two leaves nearer to each other than a spacing keep to their own
 // elements. Else, and where the polygons name no cell, it is the nearest element of the vertex's part.
 // Vertices at exactly the same position in the same part are bound alike, so that no seam opens. A vertex
-// that no polygon uses takes the nearest element of any part.
+// that no polygon uses goes with the part whose cells are nearest.
 //
 // Throws InputError: the body carries no surface, a part has no elements.
 [[nodiscard]] Binding bind(const Body& body, MapMethod method, std::size_t states = 1);

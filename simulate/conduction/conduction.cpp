@@ -120,6 +120,7 @@ class Conduction {
       check_stop();
       add_cell(c);
     }
+    refuse_at_odds();
     for (const HeatFace& face : settings_.faces) add_face(face);
     refuse_undetermined();
   }
@@ -248,6 +249,31 @@ class Conduction {
                              "one part, or take temperatures from [thermal] column = \"NAME\"");
       if (warning_.empty()) warning_ = names + " touch, and parts pass no heat to each other";
     });
+  }
+
+  // A place has one temperature, and heat that comes in there goes straight out.
+  void refuse_at_odds() const {
+    std::vector<const HeatFace*> held(body_.surface.polygon_count(), nullptr);
+    for (const HeatFace& face : settings_.faces) {
+      if (face.kind != HeatFace::Kind::temperature) continue;
+      for (const std::uint32_t p : resolve(face.where, body_).polygons) {
+        if (held[p] != nullptr && held[p]->value != face.value)
+          throw InputError(face.origin,
+                           fmt::format("\"{}\" and \"{}\" ({}) give the same place two temperatures",
+                                       face.name, held[p]->name, held[p]->origin));
+        held[p] = &face;
+      }
+    }
+    for (const HeatFace& face : settings_.faces) {
+      if (face.kind == HeatFace::Kind::temperature) continue;
+      const std::vector<std::uint32_t> polygons = resolve(face.where, body_).polygons;
+      if (!polygons.empty() &&
+          std::all_of(polygons.begin(), polygons.end(), [&](std::uint32_t p) { return held[p] != nullptr; }))
+        throw InputError(face.origin,
+                         fmt::format("\"{}\" does nothing: [[temperature]] \"{}\" ({}) holds the place where "
+                                     "heat comes in; select another face",
+                                     face.name, held[polygons[0]]->name, held[polygons[0]]->origin));
+    }
   }
 
   void find_conductivities() {

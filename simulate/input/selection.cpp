@@ -312,23 +312,31 @@ double squared_distance(const Vec3& point, const Vec3& a, const Vec3& b) {
   return (from - share * way).squaredNorm();
 }
 
-bool sweeps(const Selection& sphere, const Vec3& point) {
+bool sweeps(const Selection& sphere, const Vec3& point, double radius) {
   for (std::size_t k = 1; k < sphere.members.size(); ++k)
-    if (squared_distance(point, sphere.members[k - 1].point, sphere.members[k].point) <=
-        sphere.radius * sphere.radius)
+    if (squared_distance(point, sphere.members[k - 1].point, sphere.members[k].point) <= radius * radius)
       return true;
   return false;
 }
 
-bool holds(const Selection& selection, const Vec3& point) {
+// m: a region holds elements on its border, which planes of the lattice often are, whatever rounding makes of their places:
+// that of lattices that are turned, and of coordinates in single precision.
+double border(const Vec3& point, double spacing) {
+  constexpr double kOfSpacing = 1e-6, kOfPlace = 0x1p-22;
+  return kOfSpacing * spacing + kOfPlace * point.cwiseAbs().maxCoeff();
+}
+
+bool holds(const Selection& selection, const Vec3& point, double spacing) {
+  const double more = border(point, spacing);
   switch (selection.kind) {
     case Selection::Kind::box:
-      return (point.array() >= selection.min.array()).all() && (point.array() <= selection.max.array()).all();
+      return (point.array() >= selection.min.array() - more).all() &&
+             (point.array() <= selection.max.array() + more).all();
     case Selection::Kind::sphere:
-      if (!selection.members.empty()) return sweeps(selection, point);
-      return (point - selection.point).squaredNorm() <= selection.radius * selection.radius;
+      if (!selection.members.empty()) return sweeps(selection, point, selection.radius + more);
+      return (point - selection.point).norm() <= selection.radius + more;
     default:
-      return selection.normal.dot(point - selection.point) >= 0;
+      return selection.normal.dot(point - selection.point) >= -more;
   }
 }
 
@@ -346,8 +354,11 @@ std::string between_elements(const Selection& selection, const Body& body) {
 
 Selected resolve_region(const Selection& selection, const Body& body, const std::vector<Vec3>& at) {
   Selected selected;
-  for (std::uint32_t e = 0; e < at.size(); ++e)
-    if (holds(selection, at[e])) selected.elements.push_back(e);
+  for (const Part& part : body.parts) {
+    const double spacing = part.lattice.spacing.minCoeff();
+    for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
+      if (holds(selection, at[e], spacing)) selected.elements.push_back(e);
+  }
   if (selected.elements.empty()) {
     const Box box = bounding_box(at);
     throw EmptySelectionError(

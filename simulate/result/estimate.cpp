@@ -56,6 +56,11 @@ std::optional<Bar> stress_bar(const Sequence& s, bool singular) {
   Bar bar = richardson(s);
   if (!bar.order) return std::nullopt;
   bar.half_width = std::max(kWideSafety * std::abs(bar.extrapolated - s.value[0]), std::abs(e21));
+  // At the surface, where the largest stress mostly is, it is carried out of cells: values that close in faster than
+  // that may have met by chance.
+  constexpr double kSurfaceOrder = 1;
+  if (*bar.order > kSuspiciousOrder)
+    bar.half_width = std::max(bar.half_width, std::abs(e32) / std::pow(s.ratio[0], kSurfaceOrder));
   return bar;
 }
 

@@ -1,14 +1,16 @@
-// Selections are compared polygon by polygon and element by element; a polygon lies on held elements where
-// all that carry its middle are held. Each polygon counts by its area, each element once.
+// Selections are compared polygon by polygon and element by element; a place of a polygon lies on held elements where
+// all that carry it are held. Each place counts by its area, each element once.
 #include "simulate/scene/scene_checks.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
 #include "base/error.h"
+#include "base/human.h"
 #include "base/math/area_vector.h"
 #include "formats/lattice/locate.h"
 #include "simulate/input/scene_words.h"
@@ -16,7 +18,8 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kHeld = 0.99, kPartlyHeld = 0.1;  // of a load
+constexpr double kHeld = 0.99, kPartlyHeld = 0.1;  // of a load, of a surface that is held or led
+constexpr double kAtOdds = 0.005;                  // likewise: told from here on
 constexpr double kOffAxis = 10;                    // degrees
 constexpr double kCarries = 1e-6;                  // weight of an element
 
@@ -47,12 +50,11 @@ std::uint8_t axes_of(const Tie& tie) {
   return static_cast<std::uint8_t>(tie.axes[0] | tie.axes[1] << 1 | tie.axes[2] << 2);
 }
 
-// Of fixes, and with `moves` of those too.
-HeldMasks held_masks(const std::vector<Tie>& ties, bool moves, const Body& body) {
+HeldMasks held_masks(const std::vector<Tie>& ties, const Body& body) {
   HeldMasks held{std::vector<std::uint8_t>(body.surface.polygon_count(), 0),
                  std::vector<std::uint8_t>(body.element_count(), 0)};
   for (const Tie& tie : ties) {
-    if (tie.link || (tie.is_move && !moves)) continue;
+    if (tie.link) continue;
     const std::uint8_t mask = axes_of(tie);
     const Selected selected = resolve(tie.where, body);
     for (const std::uint32_t p : selected.polygons) held.polygon[p] |= mask;
@@ -62,14 +64,38 @@ HeldMasks held_masks(const std::vector<Tie>& ties, bool moves, const Body& body)
   return held;
 }
 
-// Axes along which the elements under a polygon's middle are held.
-std::uint8_t held_under(const HeldMasks& held, const Body& body, std::uint32_t polygon) {
-  if (!held.elements) return 0;
+// Calls visit(middle, area [m^2]) for pieces of a polygon that are no longer than a spacing, as long as these are few.
+template <class Visit>
+void for_each_patch(const Body& body, std::uint32_t polygon, const Visit& visit) {
+  constexpr std::size_t kMost = 4096;  // pieces
   const auto corners = body.surface.polygon(polygon);
-  Vec3 middle = Vec3::Zero();
-  for (const std::uint32_t v : corners)
-    middle += body.surface.vertices[v] / static_cast<double>(corners.size());
-  const auto at = locate_on_surface(body, polygon, middle);
+  const auto at = [&](std::size_t corner) { return body.surface.vertices[corners[corner]]; };
+  const double whole = area_vector(body.surface.vertices, corners).norm();
+  const double spacing = body.parts[body.surface.polygon_part(polygon)].lattice.spacing.minCoeff();
+  const double longest = std::max(spacing, std::sqrt(4 * whole / kMost));
+  std::vector<std::array<Vec3, 3>> pending;
+  for (std::size_t v = 1; v + 1 < corners.size(); ++v) pending.push_back({at(0), at(v), at(v + 1)});
+  while (!pending.empty()) {
+    const std::array<Vec3, 3> piece = pending.back();
+    pending.pop_back();
+    std::size_t edge = 0;
+    const auto length = [&](std::size_t e) { return (piece[(e + 1) % 3] - piece[e]).squaredNorm(); };
+    for (std::size_t e = 1; e < 3; ++e)
+      if (length(e) > length(edge)) edge = e;
+    if (length(edge) > longest * longest) {
+      const Vec3 middle = 0.5 * (piece[edge] + piece[(edge + 1) % 3]);
+      pending.push_back({middle, piece[(edge + 1) % 3], piece[(edge + 2) % 3]});
+      pending.push_back({piece[edge], middle, piece[(edge + 2) % 3]});
+      continue;
+    }
+    visit((piece[0] + piece[1] + piece[2]) / 3,
+          0.5 * (piece[1] - piece[0]).cross(piece[2] - piece[0]).norm());
+  }
+}
+
+// Axes along which the elements under a point of a polygon are held.
+std::uint8_t held_under(const HeldMasks& held, const Body& body, std::uint32_t polygon, const Vec3& point) {
+  const auto at = locate_on_surface(body, polygon, point);
   if (!at) return 0;
   std::uint8_t mask = 7;
   for (std::size_t a = 0; a < 8; ++a)
@@ -100,8 +126,14 @@ double held_share(const Load& load, const HeldMasks& held, const Body& body) {
   };
   for (const std::uint32_t p : selected.polygons) {
     const Vec3 area = area_vector(body.surface.vertices, body.surface.polygon(p));
-    const Vec3 along = load.pressure ? area : Vec3(area.norm() * acting);
-    count(along, static_cast<std::uint8_t>(held.polygon[p] | held_under(held, body, p)));
+    const Vec3 along = load.pressure && area.norm() > 0 ? area.normalized() : acting;
+    if (!held.elements) {
+      count(area.norm() * along, held.polygon[p]);
+      continue;
+    }
+    for_each_patch(body, p, [&](const Vec3& middle, double piece) {
+      count(piece * along, static_cast<std::uint8_t>(held.polygon[p] | held_under(held, body, p, middle)));
+    });
   }
   for (const std::uint32_t e : selected.elements) count(acting, held.element[e]);
   return whole > 0 ? straight / whole : 0;
@@ -120,26 +152,53 @@ void check_held(const Load& load, double share, Progress& progress) {
         load.origin, 100 * share, load.name, words_of(load.origin).fix_or_move));
 }
 
-// A surface that is led, on elements that are held: neither gets its way. (What is led and held by the same
-// kind of selection is refused where ties are made.)
-void check_move(const Tie& move, const HeldMasks& fixes, const Body& body) {
-  std::uint8_t moving = 0;  // axes along which it goes somewhere
+// Axes along which it goes somewhere.
+std::uint8_t moving_axes(const Tie& tie) {
+  std::uint8_t moving = 0;
   for (int axis = 0; axis < 3; ++axis)
-    if ((move.motion.angle != 0 && std::abs(move.motion.axis[axis]) < 1 - 1e-9) ||
-        move.motion.translation[axis] != 0)
-      moving = static_cast<std::uint8_t>(moving | (axes_of(move) & 1 << axis));
-  if (moving == 0) return;
+    if ((tie.motion.angle != 0 && std::abs(tie.motion.axis[axis]) < 1 - 1e-9) ||
+        tie.motion.translation[axis] != 0)
+      moving = static_cast<std::uint8_t>(moving | (axes_of(tie) & 1 << axis));
+  return moving;
+}
+
+// Axes along which both hold or lead, to different places.
+std::uint8_t axes_at_odds(const Tie& one, const Tie& other) {
+  const auto both = static_cast<std::uint8_t>(axes_of(one) & axes_of(other));
+  const Motion &a = one.motion, &b = other.motion;
+  const bool turned = a.angle != 0 || b.angle != 0;
+  if (a.translation == b.translation && a.angle == b.angle &&
+      (!turned || (a.axis == b.axis && a.through == b.through && a.arc_from == b.arc_from)))
+    return 0;
+  int odds = turned ? moving_axes(one) | moving_axes(other) : 0;
+  for (int axis = 0; axis < 3; ++axis)
+    if (a.translation[axis] != b.translation[axis]) odds |= 1 << axis;
+  return static_cast<std::uint8_t>(both & odds);
+}
+
+// A surface that is held or led, on elements that are led elsewhere: neither gets its way. (What is led and held by the same
+// kind of selection is refused where ties are made.)
+void check_at_odds(const Tie& surface, const Tie& elements, const Body& body, Progress& progress) {
+  const std::uint8_t odds = axes_at_odds(surface, elements);
+  if (odds == 0 || surface.link || elements.link) return;
+  const HeldMasks held = held_masks({elements}, body);
+  if (!held.elements) return;
   double both = 0, whole = 0;
-  for (const std::uint32_t p : resolve(move.where, body).polygons) {
-    const double area = area_vector(body.surface.vertices, body.surface.polygon(p)).norm();
-    if ((held_under(fixes, body, p) & moving) != 0) both += area;
-    whole += area;
-  }
-  if (both > kPartlyHeld * whole)
-    throw InputError(move.origin,
-                     fmt::format("move \"{}\": a [[fix]] of elements holds {:.0f} % of the place that is to "
-                                 "move; give the fix other elements or axes",
-                                 move.name, 100 * both / whole));
+  for (const std::uint32_t p : resolve(surface.where, body).polygons)
+    for_each_patch(body, p, [&](const Vec3& middle, double area) {
+      if ((held_under(held, body, p, middle) & odds) != 0) both += area;
+      whole += area;
+    });
+  if (!(both > kAtOdds * whole)) return;
+  const std::string what = fmt::format(
+      "{} \"{}\": a {} of elements {} {} of the place that {}", surface.is_move ? "move" : "fix",
+      surface.name, elements.is_move ? "[[move]]" : "[[fix]]", elements.is_move ? "leads" : "holds",
+      human_share(both / whole), surface.is_move ? "is to move" : "is held");
+  const std::string advice =
+      fmt::format("give the {} other elements or axes", elements.is_move ? "move" : "fix");
+  if (both > kPartlyHeld * whole) throw InputError(surface.origin, what + "; " + advice);
+  progress.warn(fmt::format("{}: {}, and neither gets its way there, at forces that mean nothing; {}",
+                            surface.origin, what, advice));
 }
 
 // Degrees between the mean normal of a side's polygons and its axis.
@@ -166,13 +225,10 @@ void check_actions(const Scene& scene, const Body& body, Progress& progress) {
   warn_of_unused_materials(scene, body, progress);
   if (!scene.run.time) refuse_courses(scene);
   const std::vector<Tie>& ties = scene.get<Supports>().ties;
-  if (std::any_of(ties.begin(), ties.end(), [](const Tie& tie) { return tie.is_move; })) {
-    const HeldMasks fixes = held_masks(ties, false, body);
-    for (const Tie& tie : ties)
-      if (tie.is_move) check_move(tie, fixes, body);
-  }
+  for (const Tie& surface : ties)
+    for (const Tie& elements : ties) check_at_odds(surface, elements, body, progress);
   if (scene.get<Loads>().loads.empty()) return;
-  const HeldMasks held = held_masks(ties, true, body);
+  const HeldMasks held = held_masks(ties, body);
   for (const Load& load : scene.get<Loads>().loads) {
     check_held(load, held_share(load, held, body), progress);
     check_side(load, body, progress);

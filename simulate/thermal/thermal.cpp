@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "base/error.h"
@@ -139,6 +140,13 @@ void Thermal::parse(TableReader& scene, Parameters& parameters) {
       parameters.faces.push_back(parse_face(reader, kind));
     }
   parse_figures(scene, parameters);
+  const auto from_conduction = [](const TemperatureChange& each) { return each.reference.has_value(); };
+  if (parameters.conducts() && !parameters.changes.empty() &&
+      std::none_of(parameters.changes.begin(), parameters.changes.end(), from_conduction))
+    throw InputError(parameters.changes.front().origin,
+                     "[thermal] has no \"reference\", so the temperatures of [[temperature]], [[heat]] and "
+                     "[[convection]] would expand nothing: give the one at which the part has its shape, "
+                     "reference = \"20 degC\", or leave these out");
   for (const TemperatureChange& change : parameters.changes)
     if (change.reference && change.column.empty() && !parameters.conducts())
       throw InputError(

@@ -77,6 +77,34 @@ def test_ends_that_turn_by_less_than_half_are_a_failure():
     expect(len(vertices("askew.stl")) > 0 and pathlib.Path("twisted.stl").stat().st_size > 0, "it is written")
 
 
+def spindle(tip):
+    """STL of a round bar along x, 8 mm thick, whose far end narrows to `tip` mm."""
+    round_at = lambda x, r: [(x, r * math.cos(math.pi * i / 6), r * math.sin(math.pi * i / 6)) for i in range(12)]
+    rings = [round_at(x, r) for x, r in ((0, 4), (52, 4), (60, tip / 2))]
+    near, far = rings[0], rings[-1]
+    triangles = [[near[0], near[i + 1], near[i]] for i in range(1, 11)] + [[far[0], far[i], far[i + 1]] for i in range(1, 11)]
+    for a, b in zip(rings, rings[1:]):
+        for i in range(12):
+            j = (i + 1) % 12
+            triangles += [[a[i], a[j], b[j]], [a[i], b[j], b[i]]]
+    pathlib.Path("spindle.stl").write_bytes(ascii_stl(triangles))
+
+
+def test_whole_turns_are_measured():
+    """A tip gives way and leaves the bar as it was, which a whole turn hides from the ends; a bar that turns has turned."""
+    how = ("--along", "x", "--material", "rubber", "--size", "1.5mm", "--no-estimate", "--summary", "s.json", "-o", "twisted.stl", "--force")
+    told = lambda: math.degrees(json.loads(pathlib.Path("s.json").read_text())["flex"]["angle"])
+    spindle(.4)
+    done = run("flexel", "flex", "spindle.stl", "--twist", "360 deg", *how)
+    expect_error(done, "flexel", "not by 360.00 deg", code=4)
+    expect(abs(told()) < 90, told())
+    spindle(8)
+    expect_ok(run("flexel", "flex", "spindle.stl", "--twist", "360 deg", *how))
+    expect(abs(told() - 360) < 5, told())
+    expect_ok(run("flexel", "flex", "spindle.stl", "--bend", "200 deg", *how))
+    expect(abs(told() - 200) < 5, told())
+
+
 def test_what_cannot_be_is_one_line():
     part()
     flex = lambda *words: run("flexel", "flex", "bar.stl", *words, "--material", "PLA", "--size", "2mm", "-o", "bent.stl")

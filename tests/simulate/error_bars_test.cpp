@@ -109,6 +109,15 @@ TEST(StressBar, HoldsTheLimitOrThereIsNone) {
   EXPECT_NEAR(same->half_width, 0.003, 1e-9);
 }
 
+// A twisted square bar of 4, 2 and 1 cells across, whose limit is 83.3 (Saint-Venant): the first two are alike by chance.
+TEST(StressBar, DoesNotTrustASuddenArrival) {
+  const auto bar = stress_bar({{63.4, 59.0, 17.9}, {2, 2}});
+  ASSERT_TRUE(bar.has_value());
+  EXPECT_GT(bar->half_width, 83.3 - 63.4);
+  // Of order 2, and a little above it, nothing changes.
+  EXPECT_NEAR(stress_bar(stresses([](double h) { return 5 + 0.1 * h * h; }))->half_width, 0.3, 1e-9);
+}
+
 // Coarse cells put the largest stress some way from the clamp, where three values may seem to close in.
 TEST(ErrorBars, TheStressAtAClampHasNoneAtAnySpacing) {
   for (const int n : less_if_sanitized<std::vector<int>>({6, 8, 12, 16}, {6, 8}, "two spacings of four")) {

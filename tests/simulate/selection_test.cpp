@@ -3,6 +3,11 @@
 
 #include <gmock/gmock.h>
 
+#include <Eigen/Geometry>
+
+#include <cmath>
+#include <numbers>
+
 #include "base/error.h"
 #include "formats/lattice/merge.h"
 #include "tests/simulate/box_body.h"
@@ -86,6 +91,35 @@ TEST(Selection, WhatAnAssemblyDoesNotHaveIsToldWithWhatItHas) {
   EXPECT_THAT(why(body, "machin"), HasSubstr("did you mean \"machine\""));
   EXPECT_NE(why(body, "chine/joint"), "");
   EXPECT_NE(why(body, "joint/plate"), "");
+}
+
+// Lattices' planes are where parts begin and end, and so where users' boxes do: rounding decides nothing.
+TEST(Selection, ARegionHoldsElementsOnItsBorder) {
+  for (const double spacing : {0.0025, 0.1 / 3, 7e-9, 300.0})
+    for (const double away : {0.0, 0.1, 1e4})
+      for (int turn = 0; turn < 4; ++turn) {
+        const Mat3 axes(Eigen::AngleAxisd(turn * std::numbers::pi / 2, Vec3::UnitZ()));
+        const Vec3 origin = spacing * away * Vec3(1.1, -0.7, 0.3);
+        const Body body = box_body(
+            {.cells = {6, 4, 3}, .spacing = Vec3::Constant(spacing), .origin = origin, .axes = axes});
+        const Lattice& lattice = body.parts[0].lattice;
+        const Vec3 one = lattice.to_world(Vec3(1, 0, 1)), other = lattice.to_world(Vec3(4, 4, 3));
+        Selection region;
+        region.kind = Selection::Kind::box;
+        region.min = one.cwiseMin(other) * (1 + 1e-15);
+        region.max = one.cwiseMax(other) * (1 - 1e-15);
+        EXPECT_EQ(resolve(region, body).elements.size(), 4u * 5 * 3) << spacing << " " << away << " " << turn;
+        region.kind = Selection::Kind::half_space;
+        region.point = lattice.to_world(Vec3(4, 1.7, 1.1));
+        region.normal = axes * Vec3(1, 0, 0);
+        EXPECT_EQ(resolve(region, body).elements.size(), 3u * 5 * 4);
+        region.kind = Selection::Kind::sphere;
+        region.point = lattice.to_world(Vec3(2, 2, 1));
+        region.radius = std::sqrt(2.0) * spacing * (1 - 1e-15);
+        EXPECT_EQ(resolve(region, body).elements.size(), 19u);
+        region.radius = 1.4 * spacing;  // and no more than those on it
+        EXPECT_EQ(resolve(region, body).elements.size(), 7u);
+      }
 }
 
 }  // namespace
