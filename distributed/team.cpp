@@ -30,7 +30,7 @@ using simulate::NewtonProgress;
 using simulate::Scene;
 using simulate::State;
 
-enum class Order : std::uint8_t { threads, scene, begin, solve, drop, uses, end };
+enum class Order : std::uint8_t { threads, scene, begin, solve, stable, drop, uses, end };
 
 bool at_work = false;
 double most_cells = 0;  // of a piece of this rank
@@ -123,6 +123,10 @@ class Member {
     return newton_.solve(displacement_, outer_, prescribed_, options, progress);
   }
   [[nodiscard]] std::vector<double> displacement() { return take(displacement_); }
+  [[nodiscard]] std::optional<bool> has_positive_tangent(const std::vector<double>& displacement) {
+    give(displacement_, displacement);
+    return newton_.has_positive_tangent(displacement_);
+  }
 
  private:
   std::size_t cells_;
@@ -182,6 +186,11 @@ class LeaderSolver {
     check_stop();
     return outcome;
   }
+  [[nodiscard]] std::optional<bool> has_positive_tangent(const State& state) {
+    const AtWork together;
+    order(Order::stable);
+    return member_->has_positive_tangent(values(state.displacement));
+  }
 
  private:
   [[nodiscard]] std::vector<double> values(const std::vector<Vec3>& of) const {
@@ -228,6 +237,8 @@ class Follower {
         (void)members_.back()->solve(options_of(more), nullptr, {}, {}, {});
         (void)members_.back()->displacement();
         return;
+      case Order::stable:
+        return (void)members_.back()->has_positive_tangent({});
       case Order::drop:
         return members_.pop_back();
       case Order::uses:
@@ -281,9 +292,10 @@ LoadStepSolver Leader::make_solver(Mechanics& mechanics) {
   const std::vector<std::uint8_t>& active = mechanics.cells().active();
   if (std::count(active.begin(), active.end(), 1) < ranks()) return {};
   const auto solver = std::make_shared<LeaderSolver>(mechanics, *scene_);
-  return [solver](State& state, const NewtonOptions& options, const NewtonProgress& progress) {
-    return (*solver)(state, options, progress);
-  };
+  return {[solver](State& state, const NewtonOptions& options, const NewtonProgress& progress) {
+            return (*solver)(state, options, progress);
+          },
+          [solver](const State& state) { return solver->has_positive_tangent(state); }};
 }
 
 int follow() {

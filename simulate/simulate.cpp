@@ -149,7 +149,7 @@ class Run {
   // So much of what goes before the search for the equilibrium is done.
   void prepared(double share) { progress_.update(share * kBeforeSearch, "preparing"); }
   EquilibriumResult solve(Mechanics& mechanics);
-  void warn_of_buckling(Mechanics& mechanics, Preconditioner* near);
+  void warn_of_buckling(Mechanics& mechanics, const EquilibriumResult& solved);
   [[nodiscard]] std::optional<NearStart> coarse_equilibrium(Progress& stretch);
   [[nodiscard]] std::string save_failed(const Mechanics& mechanics);
 
@@ -231,7 +231,7 @@ std::string Run::save_failed(const Mechanics& mechanics) {
 
 // A load that is as symmetric as the part does not excite the shape that it buckles into, so no load step meets buckling.
 // Nor do free strain, which acts whole from the first one on, and loads that follow, which have no energy.
-void Run::warn_of_buckling(Mechanics& mechanics, Preconditioner* near) {
+void Run::warn_of_buckling(Mechanics& mechanics, const EquilibriumResult& solved) {
   const auto drives = [](const ActiveEffect& effect) { return effect->drives(); };
   bool linked = false, follows = mechanics.follows();
   for (const Motion& motion : mechanics.constraints().motions)
@@ -244,7 +244,10 @@ void Run::warn_of_buckling(Mechanics& mechanics, Preconditioner* near) {
   const bool strained = body_.cell_columns.contains(kFreeStrainColumn);
   const bool loaded = std::any_of(mechanics.effects().begin(), mechanics.effects().end(), drives);
   if (!strained && (follows || !loaded || !judged_)) return;
-  const std::optional<bool> stable = has_positive_tangent(mechanics, state_, strained ? nullptr : near);
+  Preconditioner* near = strained ? nullptr : solved.preconditioner.get();
+  const std::optional<bool> stable = solved.has_positive_tangent
+                                         ? solved.has_positive_tangent(state_)
+                                         : has_positive_tangent(mechanics, state_, near);
   if (stable == true) return;
   const std::string less = strained ? "less heat or shrinkage than this" : "less than this load";
   progress_.warn(scene_.name + ": " +
@@ -289,8 +292,9 @@ SimulateResult Run::operator()() {
   // What touches stiffens or softens the first answer, which says nothing of buckling then.
   if (from_rest && !solved.buckled && !mechanics.unilateral()) linear_reach_ = solved.linear_reach;
   const StopWaits answered;  // what is found is told: the rest takes moments
-  warn_of_buckling(mechanics, solved.preconditioner.get());
+  warn_of_buckling(mechanics, solved);
   solved.preconditioner.reset();
+  solved.has_positive_tangent = {};
   buckled_ = solved.buckled;
   followers_ = follower_memory(mechanics);
   mechanics.report(state_, result);

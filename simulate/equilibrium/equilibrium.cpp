@@ -129,6 +129,7 @@ class LoadStepping {
         length_(first_),
         unilateral_(mechanics.unilateral()) {
     if (hooks && hooks->make_solver) solver_ = hooks->make_solver(mechanics);
+    result_.has_positive_tangent = solver_.has_positive_tangent;
     if (!hooks || !hooks->begin) return;
     done_ = hooks->begin->share;
     reach_.first = hooks->begin->reach;
@@ -183,7 +184,7 @@ class LoadStepping {
   Progress& progress_;
   const CoarseStart& start_;
   const LoadStepHooks* hooks_;  // may be null
-  LoadStepSolver solver_;       // empty: newton_with_links()
+  LoadStepSolver solver_;       // solves nothing: newton_with_links()
   const RunBeginning beginning_;
   double first_;  // share of the load: the first step; none is longer
   LoadStepLength length_;
@@ -266,8 +267,8 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   };
   result_.preconditioner.reset();
   NewtonMemory memory;
-  outcome_ = solver_ ? solver_(trial_, options, tell)
-                     : newton_with_links(mechanics_, trial_, options, tell, &memory);
+  outcome_ = solver_.solve ? solver_.solve(trial_, options, tell)
+                           : newton_with_links(mechanics_, trial_, options, tell, &memory);
   result_.preconditioner = std::move(memory.preconditioner);
   if (reach_.first == 0)
     reach_.first = outcome_.first_reach / trial_.share;  // from rest: a near start moves by less

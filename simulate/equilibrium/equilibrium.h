@@ -24,6 +24,8 @@ struct EquilibriumResult {
   double linear_reach = 0;
   // Of Mechanics::tangent(), as the last load step left it; null where that had another solver.
   std::shared_ptr<Preconditioner> preconditioner;
+  // has_positive_tangent() of such a solver; empty: none.
+  std::function<std::optional<bool>(const State&)> has_positive_tangent;
 };
 
 // What loads that follow the shape remember of the way to where they are: Effect::memory() of each, in their
@@ -54,8 +56,12 @@ void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const
 // this run's.
 using CoarseStart = std::function<std::optional<NearStart>(Progress&)>;
 
-// What solves one load step in place of newton(), with the same arguments but for the Mechanics that it was made for.
-using LoadStepSolver = std::function<NewtonOutcome(State&, const NewtonOptions&, const NewtonProgress&)>;
+// What solves one load step in place of newton(), and tells of a state what has_positive_tangent() does, with the same arguments
+// but for the Mechanics that it was made for. Both are empty where it solves nothing.
+struct LoadStepSolver {
+  std::function<NewtonOutcome(State&, const NewtonOptions&, const NewtonProgress&)> solve;
+  std::function<std::optional<bool>(const State&)> has_positive_tangent;
+};
 
 // An equilibrium on the way to the whole load.
 struct LoadStepDone {
