@@ -102,7 +102,7 @@ Bytes pack(Piece& piece) {
   std::vector<std::byte> body = body_bytes(piece.body);
   std::vector<std::string> assemblies;  // a body file without a surface has none
   for (const SurfacePart& part : piece.body.surface.parts) assemblies.push_back(part.assembly);
-  visit_all(packer, body, assemblies, piece.number, piece.owned, piece.mask, piece.added);
+  visit_all(packer, body, assemblies, piece.cell, piece.number, piece.owned, piece.mask, piece.added);
   return std::move(packer.bytes);
 }
 
@@ -111,7 +111,7 @@ Piece unpack_piece(const Bytes& bytes) {
   Piece piece;
   Bytes body;
   std::vector<std::string> assemblies;
-  visit_all(unpacker, body, assemblies, piece.number, piece.owned, piece.mask, piece.added);
+  visit_all(unpacker, body, assemblies, piece.cell, piece.number, piece.owned, piece.mask, piece.added);
   unpacker.finish();
   piece.body = read_body(std::move(body), "the message of a piece");
   if (assemblies.size() != piece.body.parts.size()) unpacker.fail();
@@ -163,6 +163,7 @@ Piece cut_piece(const Body& body, const Partition& partition, int rank, const st
     piece.mask.push_back(mask[e]);
   }
   piece.added = added_blocks(body, partition, rank, added, local);
+  piece.cell = std::move(cells);
   return piece;
 }
 

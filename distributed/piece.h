@@ -17,10 +17,11 @@ struct AddedBlock {
 };
 
 struct Piece {
-  Body body;                     // cells that resist, each of one piece only, and their elements; no surface
-  std::vector<PetscInt> number;  // (elements) of their unknowns, by threes, over all ranks
-  PetscInt owned = 0;            // elements whose unknowns are this rank's: the lowest that has them
-  std::vector<std::uint8_t> mask;  // (elements) bit i: axis i is prescribed
+  Body body;  // cells that resist, each of one piece only, and their elements; no surface
+  std::vector<std::uint32_t> cell;  // (cells) numbers in the whole body
+  std::vector<PetscInt> number;     // (elements) of their unknowns, by threes, over all ranks
+  PetscInt owned = 0;               // elements whose unknowns are this rank's: the lowest that has them
+  std::vector<std::uint8_t> mask;   // (elements) bit i: axis i is prescribed
   std::vector<AddedBlock> added;
 };
 

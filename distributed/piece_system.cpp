@@ -193,6 +193,21 @@ double PieceSystem::energy(Vec displacement, Vec outer) {
   return sum(own) - work;
 }
 
+simulate::CellsElsewhere::Figures PieceSystem::figures(Vec displacement) {
+  const State state{local(displacement), 1};
+  const auto least = [&](const simulate::SmallestJacobian& own) {
+    const std::array<double, 3> mine = {own.value, static_cast<double>(piece_.cell[own.cell]),
+                                        static_cast<double>(own.corner)};
+    std::vector<std::array<double, 3>> all(static_cast<std::size_t>(ranks()));
+    ok(MPI_Allgather(mine.data(), 3, MPI_DOUBLE, all.data(), 3, MPI_DOUBLE, PETSC_COMM_WORLD));
+    const std::array<double, 3>& found = *std::min_element(all.begin(), all.end());
+    return simulate::SmallestJacobian{found[0], static_cast<std::uint32_t>(found[1]),
+                                      static_cast<std::uint32_t>(found[2])};
+  };
+  return {sum(mechanics_.cells().energy(state)), least(mechanics_.cells().smallest_jacobian(state)),
+          least(mechanics_.cells().smallest_corner_jacobian(state))};
+}
+
 void PieceSystem::forces(Vec displacement, Vec outer, Vec inner, Vec of_effects) {
   const State state{local(displacement), 1};
   std::vector<Vec3> own_share(state.displacement.size(), Vec3::Zero());

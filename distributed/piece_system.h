@@ -39,10 +39,13 @@ class PieceSystem {
   void add(const std::vector<Vec3>& values, Vec to);
   // y = A x
   void multiply(Vec x, Vec y);
+  void diagonal(Vec to);
 
   // J: of the cells, of what effects add, and of `outer` [N], the forces that do not change; infinity where a cell
   // has J <= 0.
   [[nodiscard]] double energy(Vec displacement, Vec outer);
+  // Of the cells of all ranks, which are named by their numbers in the whole body.
+  [[nodiscard]] simulate::CellsElsewhere::Figures figures(Vec displacement);
   // N: of the cells; and of what effects add, beside `outer`.
   void forces(Vec displacement, Vec outer, Vec inner, Vec of_effects);
   // Pa (cells of the piece): Cells::predicted_stress() at `before` for the step from there to `now`.
@@ -55,7 +58,6 @@ class PieceSystem {
   void make_vectors();
   void make_matrix();
   void product(Vec x, Vec y);
-  void diagonal(Vec to);
 
   Piece piece_;
   simulate::Problem problem_;

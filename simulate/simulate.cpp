@@ -151,7 +151,7 @@ class Run {
   EquilibriumResult solve(Mechanics& mechanics);
   void warn_of_buckling(Mechanics& mechanics, const EquilibriumResult& solved);
   [[nodiscard]] std::optional<NearStart> coarse_equilibrium(Progress& stretch);
-  [[nodiscard]] std::string save_failed(const Mechanics& mechanics);
+  [[nodiscard]] std::string save_failed();
 
   Body& body_;
   const Scene& scene_;
@@ -171,6 +171,9 @@ class Run {
 };
 
 EquilibriumResult Run::solve(Mechanics& mechanics) {
+  const LoadStepHooks* hooks = options_.hooks.get();
+  const LoadStepSolver solver =
+      hooks && hooks->make_solver ? hooks->make_solver(mechanics) : LoadStepSolver();
   tied_ = mechanics.tied_elements();
   refuse_loose_fragments(fragments_, body_, tied_, mechanics.coupled_elements(), scene_.name);
   refuse_unsupported_elements(mechanics, state_, scene_.name);
@@ -179,13 +182,13 @@ EquilibriumResult Run::solve(Mechanics& mechanics) {
     CoarseStart start;
     if (body_.cell_count() >= kLeastCellsToCoarsen)
       start = [&](Progress& stretch) { return coarse_equilibrium(stretch); };
-    return find_equilibrium(mechanics, state_, scene_.run, progress_, start, options_.hooks.get());
+    return find_equilibrium(mechanics, state_, scene_.run, progress_, start, hooks, solver);
   } catch (const OverloadError& error) {
-    throw OverloadError(error.what() + save_failed(mechanics));
+    throw OverloadError(error.what() + save_failed());
   } catch (const DivergedError& error) {
-    throw DivergedError(error.what() + save_failed(mechanics));
+    throw DivergedError(error.what() + save_failed());
   } catch (const TimeoutError& error) {
-    throw TimeoutError(error.what() + save_failed(mechanics));
+    throw TimeoutError(error.what() + save_failed());
   }
 }
 
@@ -219,10 +222,10 @@ std::optional<NearStart> Run::coarse_equilibrium(Progress& stretch) {
 }
 
 // Writes the last state in equilibrium; says where it is.
-std::string Run::save_failed(const Mechanics& mechanics) {
+std::string Run::save_failed() {
   const StopWaits saving;
   if (options_.failed_output.empty()) return "";
-  carry_strays(fragments_, problem_, mechanics.stencil(), state_);
+  carry_strays(fragments_, problem_, lone_elements(problem_), state_);
   move_body(body_, state_);
   body_.cell_columns.erase(kFreeStrainColumn);  // of this run only
   write_body(body_, options_.failed_output);
@@ -245,8 +248,8 @@ void Run::warn_of_buckling(Mechanics& mechanics, const EquilibriumResult& solved
   const bool loaded = std::any_of(mechanics.effects().begin(), mechanics.effects().end(), drives);
   if (!strained && (follows || !loaded || !judged_)) return;
   Preconditioner* near = strained ? nullptr : solved.preconditioner.get();
-  const std::optional<bool> stable = solved.has_positive_tangent
-                                         ? solved.has_positive_tangent(state_)
+  const std::optional<bool> stable = mechanics.elsewhere()
+                                         ? mechanics.elsewhere()->has_positive_tangent(state_)
                                          : has_positive_tangent(mechanics, state_, near);
   if (stable == true) return;
   const std::string less = strained ? "less heat or shrinkage than this" : "less than this load";
@@ -294,7 +297,6 @@ SimulateResult Run::operator()() {
   const StopWaits answered;  // what is found is told: the rest takes moments
   warn_of_buckling(mechanics, solved);
   solved.preconditioner.reset();
-  solved.has_positive_tangent = {};
   buckled_ = solved.buckled;
   followers_ = follower_memory(mechanics);
   mechanics.report(state_, result);
@@ -303,10 +305,11 @@ SimulateResult Run::operator()() {
     for (const std::string& warning : effect->warnings(state_)) progress_.warn(warning);
   result.elastic_energy = mechanics.elastic_energy(state_);
   result.smallest_jacobian = mechanics.most_compressed(state_).value;
-  measure_corners(mechanics.cells(), body_, state_, result, progress_);
+  measure_corners(mechanics.smallest_corner_jacobian(state_), body_, result, progress_);
+  mechanics.move_cells(nullptr);
   if (options_.stress) measure_stress(problem_, state_, body_, result);
   if (options_.estimate) mark_singular(body_, tied_, result);
-  carry_strays(fragments_, problem_, mechanics.stencil(), state_);
+  carry_strays(fragments_, problem_, lone_elements(problem_), state_);
   move_body(body_, state_);
   if (scene_.run.renormalise) renormalise_all(body_, problem_, state_.displacement);
   for (const ProbePoints& probe : probes) result.probes.push_back(measure(probe, state_));

@@ -24,8 +24,6 @@ struct EquilibriumResult {
   double linear_reach = 0;
   // Of Mechanics::tangent(), as the last load step left it; null where that had another solver.
   std::shared_ptr<Preconditioner> preconditioner;
-  // has_positive_tangent() of such a solver; empty: none.
-  std::function<std::optional<bool>(const State&)> has_positive_tangent;
 };
 
 // What loads that follow the shape remember of the way to where they are: Effect::memory() of each, in their
@@ -56,12 +54,8 @@ void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const
 // this run's.
 using CoarseStart = std::function<std::optional<NearStart>(Progress&)>;
 
-// What solves one load step in place of newton(), and tells of a state what has_positive_tangent() does, with the same arguments
-// but for the Mechanics that it was made for. Both are empty where it solves nothing.
-struct LoadStepSolver {
-  std::function<NewtonOutcome(State&, const NewtonOptions&, const NewtonProgress&)> solve;
-  std::function<std::optional<bool>(const State&)> has_positive_tangent;
-};
+// What solves one load step in place of newton(), with the same arguments but for the Mechanics that it was made for.
+using LoadStepSolver = std::function<NewtonOutcome(State&, const NewtonOptions&, const NewtonProgress&)>;
 
 // An equilibrium on the way to the whole load.
 struct LoadStepDone {
@@ -72,7 +66,8 @@ struct LoadStepDone {
   std::vector<Vec3> displacement;  // m (elements)
 };
 
-// `make_solver` is asked once for each search for an equilibrium, those on coarser lattices too. `done` hears of each
+// `make_solver` is asked once for each search for an equilibrium, those on coarser lattices too; it may take the cells of the
+// mechanics elsewhere (Mechanics::move_cells()). `done` hears of each
 // load step that ended in equilibrium, but of none on a coarser lattice. `begin`: the load steps go on from there.
 struct LoadStepHooks {
   std::function<LoadStepSolver(Mechanics&)> make_solver;
@@ -86,6 +81,7 @@ struct LoadStepHooks {
 [[nodiscard]] EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state,
                                                  const RunSettings& settings, Progress& progress,
                                                  const CoarseStart& start = {},
-                                                 const LoadStepHooks* hooks = nullptr);
+                                                 const LoadStepHooks* hooks = nullptr,
+                                                 const LoadStepSolver& solver = {});
 
 }  // namespace flexel::simulate
