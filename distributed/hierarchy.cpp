@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
+#include "base/error.h"
 #include "simulate/linear/aggregate.h"
 #include "simulate/linear/block_inverse.h"
 
@@ -68,12 +70,18 @@ Hierarchy::Hierarchy(PieceSystem& system)
       pulled_(system.local_vector()) {
   ok(PCCreate(PETSC_COMM_WORLD, coarse_.solver.fill()));
   ok(PCSetOptionsPrefix(coarse_.solver, "coarse_"));
-  ok(PCSetType(coarse_.solver, PCGAMG));
-  ok(PCGAMGSetCoarseEqLim(coarse_.solver, kCoarsestUnknowns));
 }
 
-void Hierarchy::set_options() {
-  ok(PCSetFromOptions(coarse_.solver));
+// GAMG takes a matrix that it need not make coarser to block Jacobi, which is not positive then: each rank factorises it.
+void Hierarchy::choose_solver() {
+  const bool small = 6 * all_groups_ <= kCoarsestUnknowns;
+  ok(PCSetType(coarse_.solver, small ? PCREDUNDANT : PCGAMG));
+  if (!small) ok(PCGAMGSetCoarseEqLim(coarse_.solver, kCoarsestUnknowns));
+  try {
+    ok(PCSetFromOptions(coarse_.solver));
+  } catch (const std::runtime_error& error) {
+    throw InputError(std::string("--petsc: ") + error.what());
+  }
 }
 
 // Of elements that this rank owns, by their links among each other.
@@ -94,6 +102,7 @@ void Hierarchy::make_groups() {
   strength = {};
   own_groups_ = static_cast<PetscInt>(groups.count());
   first_group_ = sum_before(own_groups_, all_groups_);
+  choose_solver();
   const auto count = static_cast<std::size_t>(own_groups_) + [&] {
     std::vector<PetscInt> others = groups_of_others(groups.of);
     make_coarse_vectors(others);

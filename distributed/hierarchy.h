@@ -1,5 +1,5 @@
 // What preconditions conjugate gradients on all ranks: Flexel's own multigrid (simulate/linear/multigrid.cpp) on the elements, PETSc's
-// GAMG below. Each rank groups the elements that it owns; the matrix of the groups is the sum of what each rank's cells make of it.
+// GAMG below (where few groups are left, a factorisation). Each rank groups the elements that it owns; the matrix of the groups is the sum of what each rank's cells make of it.
 //
 // The prolongator is P = T - w D^-1 A T, as there, but w = 0 at elements that several ranks have: so a rank's rows of P, and its share of
 // P^T A P, come from its own cells alone. Of the elements nothing is stored but their groups.
@@ -14,13 +14,11 @@ namespace flexel::distributed {
 
 class Hierarchy {
  public:
-  // Takes `system`'s tangent at the first refresh().
+  // PETSc's options of the groups' solver begin with "-coarse_".
   explicit Hierarchy(PieceSystem& system);
   Hierarchy(const Hierarchy&) = delete;
   Hierarchy& operator=(const Hierarchy&) = delete;
 
-  // PETSc's options of the groups' solver begin with "-coarse_".
-  void set_options();
   // Takes up the tangent at `displacement`; the groups stay. By all ranks together, as all that follows.
   void refresh(Vec displacement);
   // Likewise, but the matrix of the groups stays.
@@ -33,6 +31,7 @@ class Hierarchy {
   using Inverse = Eigen::Matrix3f;
 
   void make_groups();
+  void choose_solver();
   std::vector<PetscInt> groups_of_others(const std::vector<std::uint32_t>& own);
   void make_coarse_vectors(const std::vector<PetscInt>& others);
   void make_coarse_matrix();

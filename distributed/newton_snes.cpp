@@ -102,7 +102,6 @@ NewtonSnes::NewtonSnes(PieceSystem& system) : system_(system), hierarchy_(system
   ok(PCShellSetName(preconditioner, "Flexel's hierarchy on the elements, PETSc's below (-coarse_)"));
   try {
     ok(SNESSetFromOptions(snes_));
-    hierarchy_.set_options();
   } catch (const std::runtime_error& error) {
     throw InputError(std::string("--petsc: ") + error.what());
   }
@@ -234,6 +233,8 @@ void NewtonSnes::before_linear(Vec right_hand_side) {
           : std::max(kFirstForcing, std::min(0.3 * options_.tolerance * memory_.scale / memory_.right_norm,
                                              kLargestForcing));
   const bool bounded = memory_.projected;
+  // Where rounding makes a projected tangent indefinite, what was reached before lowers the energy still.
+  ok(SNESSetMaxLinearSolveFailures(snes_, bounded && !full() ? PETSC_MAX_INT : 1));
   memory_.most = !full()   ? bounded ? kMaxCgOfProjected : kMaxCgIterations
                  : bounded ? std::min(kMaxCgOfFullStep, 4 * memory_.usual + kMoreCgOfProjected)
                            : kMaxCgOfFullStep;

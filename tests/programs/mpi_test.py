@@ -215,16 +215,17 @@ def test_what_is_free_is_told_as_by_flexel_simulate():
     line = '{ box = { min = ["-1 mm", "-1 mm", "-1 mm"], max = ["1 mm", "11 mm", "1 mm"] } }'
     for hold in ('where = "xmin"\naxes = "x"', 'where = "xmin"\naxes = "yz"', f"where = {line}"):
         scene(text=f'material = "steel"\n[[fix]]\n{hold}\n{load}')
-        one = expect_error(run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu"), "flexel-simulate", "is free to")
-        all_ranks = expect_error(mpi(2, "scene.toml", "body.vtu", "-o", "out.vtu"), PROGRAM, "is free to")
-        expect(one.err.replace("flexel-simulate:", PROGRAM + ":") == all_ranks.err, f"{hold}: {one.err} and {all_ranks.err}")
+        one, all_ranks = run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu"), mpi(2, "scene.toml", "body.vtu", "-o", "out.vtu")
+        expect_error(one, "flexel-simulate", "is free to")
+        expect_error(all_ranks, PROGRAM, "is free to")
+        expect(one.err.splitlines()[-1].replace("flexel-simulate:", PROGRAM + ":") == all_ranks.err.splitlines()[-1], f"{hold}: {one.err} and {all_ranks.err}")
 
 
 def test_an_equilibrium_that_is_not_stable_is_told():
     """A straight column beyond its buckling load, which no load step meets: all ranks ask, whatever their number."""
     need_mpi()
     body("body.vtu")
-    for newtons in (1, 30):
+    for newtons in (1, 3):
         scene(text=f'material = "rubber"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = ["-{newtons} N", "0 N", "0 N"]\n')
         command = ("scene.toml", "body.vtu", "-o", "out.vtu", "--force", "--no-estimate", "--no-stress")
         one = expect_ok(run("flexel-simulate", *command))
