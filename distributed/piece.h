@@ -35,7 +35,8 @@ struct Partition {
   std::vector<PetscInt> owned;     // (ranks)
 };
 
-// Slabs of equally many of the cells with active[cell] != 0, at least one a rank, along the body's longest side.
+// Slabs of the cells with active[cell] != 0, at least one a rank, along the body's longest side: equally many, but fewer for rank 0,
+// which holds the body besides.
 [[nodiscard]] Partition partition(const Body& body, const std::vector<std::uint8_t>& active, int ranks);
 
 // The piece of a rank. `mask` (elements of the body). `added`: symmetric; throws std::logic_error where it couples elements of no
