@@ -25,15 +25,11 @@ using simulate::NewtonSteps;
 constexpr double kFirstForcing = 1e-4, kLargestForcing = 0.1, kLooseForcing = 1e-3;
 constexpr double kKeepTangentBelow = 1e-3, kKeepLastTangentBelow = 1e-2;
 constexpr double kArmijo = 1e-4, kSmallestStep = 1.0 / 4096, kShrunk = 0.25;
-constexpr int kMaxCgIterations = 3000, kStepsToShrink = 8;
-constexpr PetscInt kCoarsestUnknowns = 1000;  // which are factorised
-constexpr PetscInt kAskEvery = 8;  // iterations of conjugate gradients between two looks at the clock
-
-double norm(Vec vector) {
-  double value = 0;
-  ok(VecNorm(vector, NORM_2, &value));
-  return value;
-}
+constexpr int kMaxCgIterations = 3000, kMaxCgOfFullStep = 400, kMoreCgOfProjected = 40,
+              kIterationsOfARefresh = 10;
+constexpr int kStepsToShrink = 8;
+constexpr int kMaxCgOfProjected = 400;  // of lowering steps: what is reached by then lowers the energy too
+constexpr PetscInt kAskEvery = 8;       // iterations of conjugate gradients between two looks at the clock
 
 }  // namespace
 
@@ -75,25 +71,17 @@ struct NewtonSnes::Calls {
   static PetscErrorCode judge_linear(KSP solver, PetscInt iteration, PetscReal value,
                                      KSPConvergedReason* reason, void* context) {
     return guarded(context, [&](NewtonSnes& self) {
-      double tolerance = 0, least = 0;
-      PetscInt most = 0;
-      ok(KSPGetTolerances(solver, &tolerance, &least, nullptr, &most));
-      *reason = KSP_CONVERGED_ITERATING;
-      if (std::isnan(value))
-        *reason = KSP_DIVERGED_NANORINF;
-      else if (value <= tolerance * self.memory_.right_norm)
-        *reason = KSP_CONVERGED_RTOL;
-      else if (iteration >= most)
-        *reason = KSP_DIVERGED_ITS;
-      else if (iteration > 0 && iteration % kAskEvery == 0) {
-        self.tell(value / self.memory_.right_norm);
-        if (self.agree_to_stop()) *reason = KSP_DIVERGED_BREAKDOWN;
-      }
+      *reason = self.judge_linear(solver, static_cast<int>(iteration), value);
     });
+  }
+  static PetscErrorCode precondition(PC preconditioner, Vec residual, Vec correction) {
+    void* context = nullptr;
+    if (const PetscErrorCode code = PCShellGetContext(preconditioner, &context)) return code;
+    return guarded(context, [&](NewtonSnes& self) { self.hierarchy_.apply(residual, correction); });
   }
 };
 
-NewtonSnes::NewtonSnes(PieceSystem& system) : system_(system) {
+NewtonSnes::NewtonSnes(PieceSystem& system) : system_(system), hierarchy_(system) {
   for (Vector* each : {&work_.inner, &work_.of_effects, &work_.gap, &work_.pulled, &work_.right_hand_side,
                        &work_.trial, &work_.before})
     *each = system.vector();
@@ -108,9 +96,10 @@ NewtonSnes::NewtonSnes(PieceSystem& system) : system_(system) {
   ok(KSPSetPreSolve(solver, Calls::before_linear, this));
   PC preconditioner;
   ok(KSPGetPC(solver, &preconditioner));
-  ok(PCSetType(preconditioner, PCGAMG));
-  ok(PCGAMGSetCoarseEqLim(preconditioner, kCoarsestUnknowns));
-  ok(PCGAMGSetReuseInterpolation(preconditioner, PETSC_TRUE));
+  ok(PCSetType(preconditioner, PCSHELL));
+  ok(PCShellSetContext(preconditioner, this));
+  ok(PCShellSetApply(preconditioner, Calls::precondition));
+  ok(PCShellSetName(preconditioner, "Flexel's hierarchy on the elements, PETSc's below (-coarse_)"));
   try {
     ok(SNESSetFromOptions(snes_));
   } catch (const std::runtime_error& error) {
@@ -131,7 +120,7 @@ void NewtonSnes::steps_are_ours() {
 }
 
 bool NewtonSnes::agree_to_stop() {
-  int stop = memory_.stopped || (progress_ && stop_is_due());
+  int stop = memory_.stopped || (rank() == 0 && stop_is_due());
   ok(MPI_Bcast(&stop, 1, MPI_INT, 0, PETSC_COMM_WORLD));
   memory_.stopped = stop != 0;
   return memory_.stopped;
@@ -205,11 +194,31 @@ void NewtonSnes::linearise(Vec displacement) {
                      memory_.led ? nullptr : static_cast<Vec>(work_.gap), work_.pulled);
     memory_.projected = memory_.project_next;
     memory_.factored = true;
+    refresh_hierarchy(displacement);
   }
   memory_.stepped = memory_.project_next = false;
 }
 
+// Nothing where an option has put another preconditioner in its place.
+void NewtonSnes::refresh_hierarchy(Vec displacement) {
+  KSP solver;
+  PC preconditioner;
+  PetscBool ours = PETSC_FALSE;
+  ok(SNESGetKSP(snes_, &solver));
+  ok(KSPGetPC(solver, &preconditioner));
+  ok(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(preconditioner), PCSHELL, &ours));
+  if (!ours) return;
+  if (memory_.asks && hierarchy_.made())
+    hierarchy_.refresh_smoother();
+  else
+    hierarchy_.refresh(displacement);
+}
+
 void NewtonSnes::before_linear(Vec right_hand_side) {
+  if (memory_.asks) {
+    memory_.right_norm = norm(right_hand_side);
+    return;
+  }
   if (!memory_.led) {
     ok(VecPointwiseMult(work_.pulled, work_.pulled, system_.free()));
     ok(VecAXPY(right_hand_side, 1, work_.pulled));
@@ -223,7 +232,40 @@ void NewtonSnes::before_linear(Vec right_hand_side) {
           ? forcing()
           : std::max(kFirstForcing, std::min(0.3 * options_.tolerance * memory_.scale / memory_.right_norm,
                                              kLargestForcing));
-  ok(KSPSetTolerances(solver, enough, 0, PETSC_DEFAULT, kMaxCgIterations));
+  const bool bounded = memory_.projected;
+  // Where rounding makes a projected tangent indefinite, what was reached before lowers the energy still.
+  ok(SNESSetMaxLinearSolveFailures(snes_, bounded && !full() ? PETSC_MAX_INT : 1));
+  memory_.most = !full()   ? bounded ? kMaxCgOfProjected : kMaxCgIterations
+                 : bounded ? std::min(kMaxCgOfFullStep, 4 * memory_.usual + kMoreCgOfProjected)
+                           : kMaxCgOfFullStep;
+  ok(KSPSetTolerances(solver, enough, 0, PETSC_DEFAULT, kMaxCgIterations + 1));
+}
+
+// Whether a projected tangent of full steps will take too many iterations: a smaller load is cheaper then.
+bool NewtonSnes::hopeless(int iteration, double gone, double tolerance) const {
+  if (memory_.asks || !full() || !memory_.projected || iteration < 2 * memory_.usual + kIterationsOfARefresh)
+    return false;
+  const double gained = std::max(1e-3, -std::log10(gone));
+  return iteration * std::max(0.0, -std::log10(tolerance) / gained - 1) > memory_.most;
+}
+
+// Where a full step takes too many iterations its tangent has become nearly singular. Of other steps what they have reached is taken.
+KSPConvergedReason NewtonSnes::judge_linear(KSP solver, int iteration, double value) {
+  double tolerance = 0;
+  ok(KSPGetTolerances(solver, &tolerance, nullptr, nullptr, nullptr));
+  memory_.last = iteration;
+  if (std::isnan(value)) return KSP_DIVERGED_NANORINF;
+  if (value <= tolerance * memory_.right_norm) {
+    const double decades = std::max(1.0, -std::log10(tolerance));
+    if (memory_.usual == 0 && !memory_.asks)
+      memory_.usual = std::max(1, static_cast<int>(std::lround(4 * iteration / decades)));
+    return KSP_CONVERGED_RTOL;
+  }
+  if (iteration >= memory_.most) return full() || memory_.asks ? KSP_DIVERGED_ITS : KSP_CONVERGED_ITS;
+  if (iteration == 0 || iteration % kAskEvery != 0) return KSP_CONVERGED_ITERATING;
+  tell(value / memory_.right_norm);
+  if (hopeless(iteration, value / memory_.right_norm, tolerance)) return KSP_DIVERGED_ITS;
+  return agree_to_stop() ? KSP_DIVERGED_BREAKDOWN : KSP_CONVERGED_ITERATING;
 }
 
 double NewtonSnes::rounding_floor(Vec displacement) {
@@ -380,6 +422,39 @@ NewtonOutcome NewtonSnes::solve(Vec displacement, Vec outer, Vec prescribed, con
   outcome_.cg_iterations = static_cast<int>(linear_iterations);
   say_trouble(reason);
   return outcome_;
+}
+
+std::optional<bool> NewtonSnes::has_positive_tangent(Vec displacement) {
+  constexpr double kTolerance = 1e-6;
+  constexpr int kIterations = 1000;
+  const StopWaits together;
+  progress_ = nullptr;
+  error_ = nullptr;
+  memory_ = {};
+  memory_.asks = true;
+  memory_.most = kIterations;
+  if (agree_to_stop()) return std::nullopt;
+  system_.assemble(displacement, {}, nullptr, nullptr);
+  refresh_hierarchy(displacement);
+  PetscInt first = 0, end = 0;
+  ok(VecGetOwnershipRange(work_.right_hand_side, &first, &end));
+  double* values = nullptr;
+  ok(VecGetArray(work_.right_hand_side, &values));
+  for (PetscInt i = first; i < end; ++i)
+    values[i - first] = simulate::scattered(static_cast<std::uint64_t>(i));
+  ok(VecRestoreArray(work_.right_hand_side, &values));
+  ok(VecPointwiseMult(work_.right_hand_side, work_.right_hand_side, system_.free()));
+  KSP solver;
+  ok(SNESGetKSP(snes_, &solver));
+  ok(KSPSetOperators(solver, system_.matrix(), system_.matrix()));
+  ok(KSPSetTolerances(solver, kTolerance, 0, PETSC_DEFAULT, kIterations + 1));
+  const PetscErrorCode failed = KSPSolve(solver, work_.right_hand_side, work_.trial);
+  if (error_) std::rethrow_exception(error_);
+  ok(failed);
+  KSPConvergedReason reason;
+  ok(KSPGetConvergedReason(solver, &reason));
+  if (reason == KSP_DIVERGED_INDEFINITE_MAT) return false;
+  return reason > 0 ? std::optional(true) : std::nullopt;
 }
 
 }  // namespace flexel::distributed

@@ -156,6 +156,12 @@ Bytes receive(int from) {
   return bytes;
 }
 
+double norm(Vec vector) {
+  double value = 0;
+  ok(VecNorm(vector, NORM_2, &value));
+  return value;
+}
+
 double sum(double own) {
   double all = 0;
   ok(MPI_Allreduce(&own, &all, 1, MPI_DOUBLE, MPI_SUM, PETSC_COMM_WORLD));

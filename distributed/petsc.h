@@ -35,6 +35,7 @@ using Vector = Owned<Vec, VecDestroy>;
 using Matrix = Owned<Mat, MatDestroy>;
 using Scatter = Owned<VecScatter, VecScatterDestroy>;
 using Nonlinear = Owned<SNES, SNESDestroy>;
+using Preconditioner = Owned<PC, PCDestroy>;
 using NullSpace = Owned<MatNullSpace, MatNullSpaceDestroy>;
 using Indices = Owned<IS, ISDestroy>;
 using Numbering = Owned<ISLocalToGlobalMapping, ISLocalToGlobalMappingDestroy>;
@@ -65,5 +66,6 @@ void send(int to, const Bytes& bytes);
 
 // Sum over the ranks.
 [[nodiscard]] double sum(double own);
+[[nodiscard]] double norm(Vec vector);
 
 }  // namespace flexel::distributed

@@ -65,6 +65,14 @@ Body body_of(const Body& body, const std::vector<std::uint32_t>& cells, std::vec
   return piece;
 }
 
+// So that it and the body take as much memory as the cells of another rank.
+std::size_t cells_of_first(std::size_t cells, int ranks) {
+  constexpr double kBody = 350.0 / 3000;  // bytes of a cell of the body beside those of a cell of a piece
+  const double count = static_cast<double>(cells);
+  const double left = count * ((1 + kBody) / ranks - kBody);
+  return ranks == 1 ? cells : std::max<std::size_t>(1, left < 0 ? 0 : static_cast<std::size_t>(left));
+}
+
 // The rank that has a cell of both elements.
 std::int32_t rank_of_pair(const std::vector<std::uint32_t>& cells_of_row, const Body& body,
                           const Partition& partition, std::uint32_t column) {
@@ -102,7 +110,7 @@ Bytes pack(Piece& piece) {
   std::vector<std::byte> body = body_bytes(piece.body);
   std::vector<std::string> assemblies;  // a body file without a surface has none
   for (const SurfacePart& part : piece.body.surface.parts) assemblies.push_back(part.assembly);
-  visit_all(packer, body, assemblies, piece.number, piece.owned, piece.mask, piece.added);
+  visit_all(packer, body, assemblies, piece.cell, piece.number, piece.owned, piece.mask, piece.added);
   return std::move(packer.bytes);
 }
 
@@ -111,7 +119,7 @@ Piece unpack_piece(const Bytes& bytes) {
   Piece piece;
   Bytes body;
   std::vector<std::string> assemblies;
-  visit_all(unpacker, body, assemblies, piece.number, piece.owned, piece.mask, piece.added);
+  visit_all(unpacker, body, assemblies, piece.cell, piece.number, piece.owned, piece.mask, piece.added);
   unpacker.finish();
   piece.body = read_body(std::move(body), "the message of a piece");
   if (assemblies.size() != piece.body.parts.size()) unpacker.fail();
@@ -136,8 +144,11 @@ Partition partition(const Body& body, const std::vector<std::uint8_t>& active, i
                    std::vector<PetscInt>(body.element_count(), -1),
                    std::vector<PetscInt>(static_cast<std::size_t>(ranks), 0)};
   std::vector<std::int32_t> owner(body.element_count(), ranks);
+  const std::size_t of_first = cells_of_first(cells.size(), ranks),
+                    others = static_cast<std::size_t>(ranks) - 1;
   for (std::size_t i = 0; i < cells.size(); ++i) {
-    const auto rank = static_cast<std::int32_t>(i * static_cast<std::size_t>(ranks) / cells.size());
+    const auto rank =
+        static_cast<std::int32_t>(i < of_first ? 0 : 1 + (i - of_first) * others / (cells.size() - of_first));
     result.rank[cells[i]] = rank;
     for (const std::uint32_t e : body.cell_elements[cells[i]]) owner[e] = std::min(owner[e], rank);
   }
@@ -163,6 +174,7 @@ Piece cut_piece(const Body& body, const Partition& partition, int rank, const st
     piece.mask.push_back(mask[e]);
   }
   piece.added = added_blocks(body, partition, rank, added, local);
+  piece.cell = std::move(cells);
   return piece;
 }
 

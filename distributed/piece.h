@@ -17,10 +17,11 @@ struct AddedBlock {
 };
 
 struct Piece {
-  Body body;                     // cells that resist, each of one piece only, and their elements; no surface
-  std::vector<PetscInt> number;  // (elements) of their unknowns, by threes, over all ranks
-  PetscInt owned = 0;            // elements whose unknowns are this rank's: the lowest that has them
-  std::vector<std::uint8_t> mask;  // (elements) bit i: axis i is prescribed
+  Body body;  // cells that resist, each of one piece only, and their elements; no surface
+  std::vector<std::uint32_t> cell;  // (cells) numbers in the whole body
+  std::vector<PetscInt> number;     // (elements) of their unknowns, by threes, over all ranks
+  PetscInt owned = 0;               // elements whose unknowns are this rank's: the lowest that has them
+  std::vector<std::uint8_t> mask;   // (elements) bit i: axis i is prescribed
   std::vector<AddedBlock> added;
 };
 
@@ -34,7 +35,8 @@ struct Partition {
   std::vector<PetscInt> owned;     // (ranks)
 };
 
-// Slabs of equally many of the cells with active[cell] != 0, at least one a rank, along the body's longest side.
+// Slabs of the cells with active[cell] != 0, at least one a rank, along the body's longest side: equally many, but fewer for rank 0,
+// which holds the body besides.
 [[nodiscard]] Partition partition(const Body& body, const std::vector<std::uint8_t>& active, int ranks);
 
 // The piece of a rank. `mask` (elements of the body). `added`: symmetric; throws std::logic_error where it couples elements of no

@@ -1,27 +1,62 @@
-// A rank's rows of the matrix are made by the product's own loops, then added row by row to PETSc's.
+// What rank 0's effects do to a piece is an effect of the piece's own: blocks of stiffness, and a mask.
 #include "distributed/piece_system.h"
 
 #include <algorithm>
-
-#include "base/parallel.h"
-#include "simulate/conditions/constraints.h"
-#include "simulate/linear/operator.h"
 
 namespace flexel::distributed {
 namespace {
 
 using simulate::Block;
+using simulate::BlockMatrix;
 using simulate::State;
 
-// Blocks of a row whose cells may be on several ranks: of a whole neighbourhood.
-constexpr PetscInt kWholeRow = 27;
+class PieceEffects : public simulate::Effect {
+ public:
+  explicit PieceEffects(const Piece& piece) : piece_(piece) {}
+  [[nodiscard]] std::string why() const override { return "of rank 0"; }
+  [[nodiscard]] bool adds_stiffness() const override { return !piece_.added.empty(); }
+  [[nodiscard]] double energy(const State& state) override {
+    double energy = 0;
+    for (const AddedBlock& block : piece_.added)
+      energy += 0.5 * state.displacement[block.row].dot(value_of(block) * state.displacement[block.column]);
+    return energy;
+  }
+  void add_forces(const State& state, std::vector<Vec3>& forces) override {
+    for (const AddedBlock& block : piece_.added)
+      forces[block.row] -= value_of(block) * state.displacement[block.column];
+  }
+  void add_stiffness(const State&, BlockMatrix& matrix) override {
+    for (const AddedBlock& block : piece_.added)
+      matrix.values[position_of(matrix, block.row, block.column)] += value_of(block);
+  }
+  void constrain(simulate::Constraints& constraints) override { constraints.mask = piece_.mask; }
 
-Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> value_of(const AddedBlock& block) {
-  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(block.value.data());
+ private:
+  static Eigen::Map<const Block> value_of(const AddedBlock& block) {
+    return Eigen::Map<const Block>(block.value.data());
+  }
+  const Piece& piece_;
+};
+
+std::vector<simulate::ActiveEffect> effects_of(const Piece& piece) {
+  std::vector<simulate::ActiveEffect> effects;
+  effects.emplace_back("effects", std::make_unique<PieceEffects>(piece));
+  return effects;
 }
 
-simulate::ConnectionRows no_connections(const Body& body) {
-  return {std::vector<std::uint32_t>(body.element_count() + 1, 0), {}};
+// An exception must not cross PETSc's frames.
+template <class Call>
+PetscErrorCode guarded(Mat matrix, const Call& call) {
+  void* context = nullptr;
+  if (const PetscErrorCode code = MatShellGetContext(matrix, &context)) return code;
+  try {
+    call(*static_cast<PieceSystem*>(context));
+    return 0;
+  } catch (const std::bad_alloc&) {
+    return PETSC_ERR_MEM;
+  } catch (const std::exception&) {
+    return PETSC_ERR_LIB;
+  }
 }
 
 }  // namespace
@@ -32,38 +67,40 @@ PieceSystem::PieceSystem(Piece piece, const simulate::Scene& scene)
                simulate::materials_of_parts(scene, piece_.body),
                {},
                simulate::models_of_parts(scene, piece_.body)},
-      pattern_(simulate::stiffness_pattern(piece_.body, simulate::active_cells(problem_),
-                                           no_connections(piece_.body))),
-      cells_(problem_, pattern_.stencil) {
-  constraints_.mask = piece_.mask;
+      mechanics_(problem_, effects_of(piece_), simulate::StiffnessStorage::made) {
   make_vectors();
   make_matrix();
-  set_near_null_space();
 }
 
 void PieceSystem::make_vectors() {
   const auto count = static_cast<PetscInt>(piece_.number.size());
-  ok(ISLocalToGlobalMappingCreate(PETSC_COMM_WORLD, 3, count, piece_.number.data(), PETSC_COPY_VALUES,
-                                  numbering_.fill()));
   ok(VecCreate(PETSC_COMM_WORLD, global_.fill()));
   ok(VecSetSizes(global_, 3 * piece_.owned, PETSC_DETERMINE));
   ok(VecSetBlockSize(global_, 3));
   ok(VecSetType(global_, VECSTANDARD));
   ok(VecCreateSeq(PETSC_COMM_SELF, 3 * count, local_.fill()));
+  ok(VecDuplicate(local_, image_.fill()));
   Indices blocks;
   ok(ISCreateBlock(PETSC_COMM_SELF, 3, count, piece_.number.data(), PETSC_COPY_VALUES, blocks.fill()));
   ok(VecScatterCreate(global_, blocks, local_, nullptr, to_local_.fill()));
+  PetscInt first = 0;
+  ok(VecGetOwnershipRange(global_, &first, nullptr));
+  for (const PetscInt number : piece_.number) {
+    const PetscInt place = number - first / 3;
+    place_.push_back(place >= 0 && place < piece_.owned ? place : -1);
+  }
+  Vector sharers = vector();
+  add(std::vector<Vec3>(piece_.number.size(), Vec3::Ones()), sharers);
+  for (const Vec3& each : local(sharers)) shared_.push_back(each.x() > 1);
   free_ = vector();
   // Every rank that has an element knows its mask: how many held it, and how many did not.
   std::vector<Vec3> open(piece_.number.size());
   for (std::size_t e = 0; e < open.size(); ++e)
     for (int axis = 0; axis < 3; ++axis) open[e][axis] = piece_.mask[e] >> axis & 1 ? 0 : 1;
   add(open, free_);
-  PetscInt own = 0;
-  ok(VecGetLocalSize(free_, &own));
   double* values = nullptr;
   ok(VecGetArray(free_, &values));
-  for (PetscInt i = 0; i < own; ++i) values[i] = values[i] > 0 ? 1 : 0;
+  for (PetscInt i = 0; i < 3 * piece_.owned; ++i) values[i] = values[i] > 0 ? 1 : 0;
   ok(VecRestoreArray(free_, &values));
 }
 
@@ -74,57 +111,41 @@ Vector PieceSystem::vector() const {
   return made;
 }
 
-void PieceSystem::make_matrix() {
-  const std::size_t count = piece_.number.size();
-  Vector sharers = vector();
-  add(std::vector<Vec3>(count, Vec3::Ones()), sharers);
-  const std::vector<Vec3> shared = local(sharers);
-  PetscInt first = 0, all = 0;
-  ok(VecGetOwnershipRange(global_, &first, nullptr));
-  ok(VecGetSize(global_, &all));
-  first /= 3;
-  const PetscInt own = piece_.owned, other = all / 3 - own;
-  std::vector<PetscInt> near(static_cast<std::size_t>(own), 0), far(static_cast<std::size_t>(own), 0);
-  const auto is_own = [&](PetscInt number) { return number >= first && number < first + own; };
-  for (std::size_t e = 0; e < count; ++e) {
-    if (!is_own(piece_.number[e])) continue;
-    const auto row = static_cast<std::size_t>(piece_.number[e] - first);
-    for (std::uint64_t q = pattern_.matrix.row_offsets[e]; q < pattern_.matrix.row_offsets[e + 1]; ++q)
-      ++(is_own(piece_.number[pattern_.matrix.columns[q]]) ? near : far)[row];
-    if (shared[e].x() > 1) {
-      near[row] = std::min(std::max(near[row], kWholeRow), own);
-      far[row] = std::min(std::max(far[row], kWholeRow), other);
-    }
-  }
-  ok(MatCreate(PETSC_COMM_WORLD, matrix_.fill()));
-  ok(MatSetSizes(matrix_, 3 * own, 3 * own, PETSC_DETERMINE, PETSC_DETERMINE));
-  ok(MatSetBlockSize(matrix_, 3));
-  ok(MatSetType(matrix_, MATAIJ));
-  ok(MatXAIJSetPreallocation(matrix_, 3, near.data(), far.data(), nullptr, nullptr));
-  ok(MatSetLocalToGlobalMapping(matrix_, numbering_, numbering_));
-  // Where more than 27 elements meet at one, as at pieces of a voxel, rows grow.
-  ok(MatSetOption(matrix_, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE));
-  ok(MatSetOption(matrix_, MAT_SPD, PETSC_TRUE));
+Vector PieceSystem::local_vector() const {
+  Vector made;
+  ok(VecDuplicate(local_, made.fill()));
+  return made;
 }
 
-// The six motions of the whole as a rigid body.
-void PieceSystem::set_near_null_space() {
-  Vector places = vector();
-  const auto count = static_cast<PetscInt>(piece_.number.size());
-  std::vector<double> rest(3 * piece_.number.size());
-  for (std::size_t e = 0; e < piece_.number.size(); ++e)
-    std::copy_n(piece_.body.rest[e].data(), 3, &rest[3 * e]);
-  ok(VecSetValuesBlocked(places, count, piece_.number.data(), rest.data(), INSERT_VALUES));
-  ok(VecAssemblyBegin(places));
-  ok(VecAssemblyEnd(places));
-  NullSpace motions;
-  ok(MatNullSpaceCreateRigidBody(places, motions.fill()));
-  ok(MatSetNearNullSpace(matrix_, motions));
+void PieceSystem::make_matrix() {
+  const PetscInt own = 3 * piece_.owned;
+  ok(MatCreateShell(PETSC_COMM_WORLD, own, own, PETSC_DETERMINE, PETSC_DETERMINE, this, matrix_.fill()));
+  ok(MatSetBlockSize(matrix_, 3));
+  PetscErrorCode (*product_of)(Mat, Vec, Vec) = [](Mat matrix, Vec x, Vec y) {
+    return guarded(matrix, [&](PieceSystem& self) { self.product(x, y); });
+  };
+  PetscErrorCode (*get_diagonal)(Mat, Vec) = [](Mat matrix, Vec to) {
+    return guarded(matrix, [&](PieceSystem& self) { self.diagonal(to); });
+  };
+  ok(MatShellSetOperation(matrix_, MATOP_MULT, reinterpret_cast<void (*)()>(product_of)));
+  ok(MatShellSetOperation(matrix_, MATOP_GET_DIAGONAL, reinterpret_cast<void (*)()>(get_diagonal)));
+  ok(MatSetOption(matrix_, MAT_SYMMETRIC, PETSC_TRUE));
+  ok(MatAssemblyBegin(matrix_, MAT_FINAL_ASSEMBLY));
+  ok(MatAssemblyEnd(matrix_, MAT_FINAL_ASSEMBLY));
+}
+
+void PieceSystem::forward(Vec from, Vec to_local) {
+  ok(VecScatterBegin(to_local_, from, to_local, INSERT_VALUES, SCATTER_FORWARD));
+  ok(VecScatterEnd(to_local_, from, to_local, INSERT_VALUES, SCATTER_FORWARD));
+}
+
+void PieceSystem::add(Vec local, Vec to) {
+  ok(VecScatterBegin(to_local_, local, to, ADD_VALUES, SCATTER_REVERSE));
+  ok(VecScatterEnd(to_local_, local, to, ADD_VALUES, SCATTER_REVERSE));
 }
 
 std::vector<Vec3> PieceSystem::local(Vec values) {
-  ok(VecScatterBegin(to_local_, values, local_, INSERT_VALUES, SCATTER_FORWARD));
-  ok(VecScatterEnd(to_local_, values, local_, INSERT_VALUES, SCATTER_FORWARD));
+  forward(values, local_);
   const double* from = nullptr;
   ok(VecGetArrayRead(local_, &from));
   std::vector<Vec3> result(piece_.number.size());
@@ -138,80 +159,77 @@ void PieceSystem::add(const std::vector<Vec3>& values, Vec to) {
   ok(VecGetArray(local_, &array));
   for (std::size_t e = 0; e < values.size(); ++e) Eigen::Map<Vec3>(array + 3 * e) = values[e];
   ok(VecRestoreArray(local_, &array));
-  ok(VecScatterBegin(to_local_, local_, to, ADD_VALUES, SCATTER_REVERSE));
-  ok(VecScatterEnd(to_local_, local_, to, ADD_VALUES, SCATTER_REVERSE));
+  add(local_, to);
 }
 
-std::vector<Vec3> PieceSystem::added_product(const std::vector<Vec3>& displacement) const {
-  std::vector<Vec3> product(displacement.size(), Vec3::Zero());
-  for (const AddedBlock& block : piece_.added)
-    product[block.row] += value_of(block) * displacement[block.column];
-  return product;
+void PieceSystem::multiply(Vec x, Vec y) {
+  ok(MatMult(matrix_, x, y));
+}
+
+void PieceSystem::product(Vec x, Vec y) {
+  forward(x, local_);
+  const double* from = nullptr;
+  double* to = nullptr;
+  ok(VecGetArrayRead(local_, &from));
+  ok(VecGetArray(image_, &to));
+  own().multiply(from, to);
+  ok(VecRestoreArray(image_, &to));
+  ok(VecRestoreArrayRead(local_, &from));
+  ok(VecZeroEntries(y));
+  add(image_, y);
+}
+
+void PieceSystem::diagonal(Vec to) {
+  std::vector<Vec3> own_share;
+  for (const Block& block : own().diagonal()) own_share.emplace_back(block.diagonal());
+  ok(VecZeroEntries(to));
+  add(own_share, to);
 }
 
 double PieceSystem::energy(Vec displacement, Vec outer) {
-  const State state{local(displacement), 1};
-  double own = cells_.energy(state);
-  const std::vector<Vec3> product = added_product(state.displacement);
-  for (std::size_t e = 0; e < product.size(); ++e) own += 0.5 * product[e].dot(state.displacement[e]);
+  const double own = mechanics_.energy({local(displacement), 1});
   double work = 0;
   ok(VecDot(displacement, outer, &work));
   return sum(own) - work;
 }
 
+simulate::CellsElsewhere::Figures PieceSystem::figures(Vec displacement) {
+  const State state{local(displacement), 1};
+  const auto least = [&](const simulate::SmallestJacobian& own) {
+    const std::array<double, 3> mine = {own.value, static_cast<double>(piece_.cell[own.cell]),
+                                        static_cast<double>(own.corner)};
+    std::vector<std::array<double, 3>> all(static_cast<std::size_t>(ranks()));
+    ok(MPI_Allgather(mine.data(), 3, MPI_DOUBLE, all.data(), 3, MPI_DOUBLE, PETSC_COMM_WORLD));
+    const std::array<double, 3>& found = *std::min_element(all.begin(), all.end());
+    return simulate::SmallestJacobian{found[0], static_cast<std::uint32_t>(found[1]),
+                                      static_cast<std::uint32_t>(found[2])};
+  };
+  return {sum(mechanics_.cells().energy(state)), least(mechanics_.cells().smallest_jacobian(state)),
+          least(mechanics_.cells().smallest_corner_jacobian(state))};
+}
+
 void PieceSystem::forces(Vec displacement, Vec outer, Vec inner, Vec of_effects) {
   const State state{local(displacement), 1};
-  std::vector<Vec3> own(state.displacement.size(), Vec3::Zero());
-  cells_.add_forces(state, own);
+  std::vector<Vec3> own_share(state.displacement.size(), Vec3::Zero());
+  mechanics_.add_elastic_forces(state, own_share);
   ok(VecZeroEntries(inner));
-  add(own, inner);
-  std::vector<Vec3> product = added_product(state.displacement);
-  for (Vec3& force : product) force = -force;
+  add(own_share, inner);
   ok(VecCopy(outer, of_effects));
-  add(product, of_effects);
+  add(mechanics_.forces_of_effects(state), of_effects);
 }
 
 std::vector<Mat3> PieceSystem::predicted_stress(Vec before, Vec now) {
   const State state{local(before), 1};
   std::vector<Vec3> step = local(now);
   for (std::size_t e = 0; e < step.size(); ++e) step[e] -= state.displacement[e];
-  return cells_.predicted_stress(state, step);
+  return mechanics_.cells().predicted_stress(state, step);
 }
 
 void PieceSystem::assemble(Vec displacement, const simulate::TangentOptions& tangent, Vec gap, Vec pulled) {
-  cells_.set_stiffness({local(displacement), 1}, tangent, pattern_.matrix);
-  for (const AddedBlock& block : piece_.added)
-    pattern_.matrix.values[position_of(pattern_.matrix, block.row, block.column)] += value_of(block);
-  if (gap) {
-    const std::vector<Vec3> way = local(gap);
-    std::vector<Vec3> force(way.size());
-    simulate::multiply(pattern_.matrix, way, force);
-    ok(VecZeroEntries(pulled));
-    add(force, pulled);
-  }
-  simulate::eliminate(constraints_, pattern_.matrix);
-  insert_rows();
-}
-
-void PieceSystem::insert_rows() {
-  ok(MatZeroEntries(matrix_));
-  std::vector<PetscInt> columns;
-  std::vector<double> values;
-  for (std::size_t e = 0; e < piece_.number.size(); ++e) {
-    const std::uint64_t begin = pattern_.matrix.row_offsets[e], end = pattern_.matrix.row_offsets[e + 1];
-    const std::size_t width = end - begin;
-    columns.assign(pattern_.matrix.columns.begin() + static_cast<std::ptrdiff_t>(begin),
-                   pattern_.matrix.columns.begin() + static_cast<std::ptrdiff_t>(end));
-    values.resize(9 * width);
-    for (std::size_t q = 0; q < width; ++q)
-      for (std::size_t i = 0; i < 3; ++i)
-        for (std::size_t j = 0; j < 3; ++j)
-          values[(i * width + q) * 3 + j] =
-              pattern_.matrix.values[begin + q](static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-    const auto row = static_cast<PetscInt>(e);
-    ok(MatSetValuesBlockedLocal(matrix_, 1, &row, static_cast<PetscInt>(width), columns.data(), values.data(),
-                                ADD_VALUES));
-  }
+  mechanics_.assemble({local(displacement), 1}, tangent);
+  if (gap) product(gap, pulled);
+  mechanics_.eliminate_prescribed();
+  // So that PETSc's own preconditioners are made anew.
   ok(MatAssemblyBegin(matrix_, MAT_FINAL_ASSEMBLY));
   ok(MatAssemblyEnd(matrix_, MAT_FINAL_ASSEMBLY));
 }

@@ -30,7 +30,9 @@ using simulate::NewtonProgress;
 using simulate::Scene;
 using simulate::State;
 
-enum class Order : std::uint8_t { threads, scene, begin, solve, drop, uses, end };
+enum class Order : std::uint8_t { threads, scene, begin, solve, of_state, multiply, drop, uses, end };
+// Of a state, or of the tangent.
+enum class Question : std::uint8_t { figures, forces, stable, diagonal };
 
 bool at_work = false;
 double most_cells = 0;  // of a piece of this rank
@@ -114,17 +116,43 @@ class Member {
     ok(VecRestoreArrayRead(leader_, &array));
     return values;
   }
-  NewtonOutcome solve(const NewtonOptions& options, const NewtonProgress* progress,
-                      const std::vector<double>& displacement, const std::vector<double>& outer,
-                      const std::vector<double>& prescribed) {
-    give(displacement_, displacement);
-    give(outer_, outer);
-    give(prescribed_, prescribed);
+  void give_displacement(const std::vector<double>& values) { give(displacement_, values); }
+  void give_outer(const std::vector<double>& values) { give(outer_, values); }
+  void give_prescribed(const std::vector<double>& values) { give(prescribed_, values); }
+  [[nodiscard]] std::vector<double> displacement() { return take(displacement_); }
+  [[nodiscard]] std::vector<double> outer() { return take(outer_); }
+  NewtonOutcome solve(const NewtonOptions& options, const NewtonProgress* progress) {
     return newton_.solve(displacement_, outer_, prescribed_, options, progress);
   }
-  [[nodiscard]] std::vector<double> displacement() { return take(displacement_); }
+
+  // What is asked of the displacement that was given; values of elements are in outer() then.
+  struct Answer {
+    simulate::CellsElsewhere::Figures figures;
+    std::optional<bool> stable;
+  };
+  Answer ask(Question question) {
+    Answer answer;
+    if (question == Question::figures) answer.figures = system_.figures(displacement_);
+    if (question == Question::forces) system_.forces(displacement_, outer_, outer_, prescribed_);
+    if (question == Question::stable) answer.stable = newton_.has_positive_tangent(displacement_);
+    if (question == Question::diagonal) {
+      assemble_at_rest();
+      system_.diagonal(outer_);
+    }
+    return answer;
+  }
+  // The product of the tangent at rest with the displacement that was given, in outer().
+  void multiply() {
+    assemble_at_rest();
+    system_.multiply(displacement_, outer_);
+  }
 
  private:
+  void assemble_at_rest() {
+    ok(VecZeroEntries(prescribed_));
+    system_.assemble(prescribed_, {}, nullptr, nullptr);
+  }
+
   std::size_t cells_;
   PieceSystem system_;
   NewtonSnes newton_;
@@ -133,13 +161,14 @@ class Member {
 };
 
 // Of rank 0.
-class LeaderSolver {
+class LeaderSolver : public simulate::CellsElsewhere {
  public:
-  LeaderSolver(Mechanics& mechanics, const Scene& scene) : mechanics_(mechanics) {
+  LeaderSolver(Mechanics& mechanics, const std::vector<std::uint8_t>& active, const Scene& scene)
+      : mechanics_(mechanics) {
     const Body& body = mechanics.body();
     const State rest{std::vector<Vec3>(body.element_count(), Vec3::Zero()), 1};
     const BlockMatrix added = mechanics.stiffness_of_effects(rest);
-    const Partition parts = partition(body, mechanics.cells().active(), ranks());
+    const Partition parts = partition(body, active, ranks());
     const AtWork together;
     order(Order::begin);
     for (int to = 1; to < ranks(); ++to) {
@@ -155,7 +184,7 @@ class LeaderSolver {
     member_ = std::make_unique<Member>(cut_piece(body, parts, 0, mechanics.constraints().mask, added), scene,
                                        numbers);
   }
-  ~LeaderSolver() {
+  ~LeaderSolver() override {
     if (at_work)
       (void)member_.release();  // the others are ended, not asked
     else
@@ -167,14 +196,11 @@ class LeaderSolver {
   NewtonOutcome operator()(State& state, const NewtonOptions& options, const NewtonProgress& progress) {
     NewtonOutcome outcome;
     {
-      const State rest{std::vector<Vec3>(state.displacement.size(), Vec3::Zero()), state.share};
-      std::vector<Vec3> prescribed = state.displacement;
-      apply(mechanics_.constraints(), mechanics_.body(), state, prescribed);
-      const std::vector<double> outer = values(mechanics_.forces_of_effects(rest));
       const AtWork together;
       NewtonOptions said = options;
       order(Order::solve, bytes_of(said));
-      outcome = member_->solve(options, &progress, values(state.displacement), outer, values(prescribed));
+      give(state);
+      outcome = member_->solve(options, &progress);
       const std::vector<double> found = member_->displacement();
       for (std::size_t i = 0; i < elements_.size(); ++i)
         state.displacement[elements_[i]] = Eigen::Map<const Vec3>(&found[3 * i]);
@@ -183,7 +209,57 @@ class LeaderSolver {
     return outcome;
   }
 
+  [[nodiscard]] Figures figures(const State& state) override { return ask(Question::figures, state).figures; }
+  void add_forces(const State& state, std::vector<Vec3>& forces) override {
+    (void)ask(Question::forces, state);
+    add(take_values(), forces);
+  }
+  [[nodiscard]] std::optional<bool> has_positive_tangent(const State& state) override {
+    return ask(Question::stable, state).stable;
+  }
+  [[nodiscard]] std::vector<Vec3> diagonal() override {
+    std::vector<Vec3> all(mechanics_.body().element_count(), Vec3::Zero());
+    (void)ask(Question::diagonal, {all, 1});
+    add(take_values(), all);
+    return all;
+  }
+  void multiply(const std::vector<Vec3>& x, std::vector<Vec3>& y) override {
+    {
+      const AtWork together;
+      order(Order::multiply);
+      member_->give_displacement(values(x));
+      member_->multiply();
+      answer_ = member_->outer();
+    }
+    std::fill(y.begin(), y.end(), Vec3::Zero());
+    add(take_values(), y);
+  }
+
  private:
+  // One by one: each takes as much room as the displacements.
+  void give(const State& state) {
+    member_->give_displacement(values(state.displacement));
+    {
+      std::vector<Vec3> prescribed = state.displacement;
+      apply(mechanics_.constraints(), mechanics_.body(), state, prescribed);
+      member_->give_prescribed(values(prescribed));
+    }
+    const State rest{std::vector<Vec3>(state.displacement.size(), Vec3::Zero()), state.share};
+    member_->give_outer(values(mechanics_.forces_of_effects(rest)));
+  }
+  Member::Answer ask(Question question, const State& state) {
+    const AtWork together;
+    order(Order::of_state, {static_cast<std::byte>(question)});
+    member_->give_displacement(values(state.displacement));
+    const Member::Answer answer = member_->ask(question);
+    answer_ = member_->outer();
+    return answer;
+  }
+  [[nodiscard]] std::vector<double> take_values() { return std::exchange(answer_, {}); }
+  void add(const std::vector<double>& values, std::vector<Vec3>& to) const {
+    for (std::size_t i = 0; i < elements_.size(); ++i)
+      to[elements_[i]] += Eigen::Map<const Vec3>(&values[3 * i]);
+  }
   [[nodiscard]] std::vector<double> values(const std::vector<Vec3>& of) const {
     std::vector<double> result(3 * elements_.size());
     for (std::size_t i = 0; i < elements_.size(); ++i)
@@ -194,6 +270,7 @@ class LeaderSolver {
   Mechanics& mechanics_;
   std::vector<std::uint32_t> elements_;  // that have unknowns
   std::unique_ptr<Member> member_;
+  std::vector<double> answer_;  // of the last question, values of `elements_`
 };
 
 template <class... Values>
@@ -225,9 +302,15 @@ class Follower {
             std::make_unique<Member>(unpack_piece(receive(0)), scene_, std::vector<PetscInt>()));
         return;
       case Order::solve:
-        (void)members_.back()->solve(options_of(more), nullptr, {}, {}, {});
-        (void)members_.back()->displacement();
-        return;
+        return solve(*members_.back(), options_of(more));
+      case Order::of_state:
+        members_.back()->give_displacement({});
+        (void)members_.back()->ask(static_cast<Question>(more[0]));
+        return (void)members_.back()->outer();
+      case Order::multiply:
+        members_.back()->give_displacement({});
+        members_.back()->multiply();
+        return (void)members_.back()->outer();
       case Order::drop:
         return members_.pop_back();
       case Order::uses:
@@ -242,6 +325,13 @@ class Follower {
   }
 
  private:
+  static void solve(Member& member, const NewtonOptions& options) {
+    member.give_displacement({});
+    member.give_prescribed({});
+    member.give_outer({});
+    (void)member.solve(options, nullptr);
+    (void)member.displacement();
+  }
   void take_scene(std::span<const std::byte> more) {
     std::string text, name;
     Unpacker unpacker(more, "the message of a scene", "is damaged");
@@ -278,9 +368,10 @@ void Leader::end(int code) {
 
 LoadStepSolver Leader::make_solver(Mechanics& mechanics) {
   refuse_unsupported(*scene_, mechanics.effects());
-  const std::vector<std::uint8_t>& active = mechanics.cells().active();
+  const std::vector<std::uint8_t> active = mechanics.active();
   if (std::count(active.begin(), active.end(), 1) < ranks()) return {};
-  const auto solver = std::make_shared<LeaderSolver>(mechanics, *scene_);
+  const auto solver = std::make_shared<LeaderSolver>(mechanics, active, *scene_);
+  mechanics.move_cells(solver);
   return [solver](State& state, const NewtonOptions& options, const NewtonProgress& progress) {
     return (*solver)(state, options, progress);
   };

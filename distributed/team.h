@@ -20,7 +20,8 @@ class Leader {
   Leader(const Leader&) = delete;
   Leader& operator=(const Leader&) = delete;
 
-  // Cuts the body of `mechanics` into pieces, one for each rank, and solves on them. `mechanics` and this must outlive what is returned.
+  // Cuts the body of `mechanics` into pieces, one for each rank, and solves on them. The cells are moved there, until `mechanics` ends or
+  // moves them back. `mechanics` and this must outlive what is returned.
   // Empty where there are fewer cells than ranks, as on a coarse lattice: rank 0 solves that alone. Throws InputError for effects that
   // ranks do not share.
   [[nodiscard]] simulate::LoadStepSolver make_solver(simulate::Mechanics& mechanics);

@@ -149,9 +149,9 @@ class Run {
   // So much of what goes before the search for the equilibrium is done.
   void prepared(double share) { progress_.update(share * kBeforeSearch, "preparing"); }
   EquilibriumResult solve(Mechanics& mechanics);
-  void warn_of_buckling(Mechanics& mechanics, Preconditioner* near);
+  void warn_of_buckling(Mechanics& mechanics, const EquilibriumResult& solved);
   [[nodiscard]] std::optional<NearStart> coarse_equilibrium(Progress& stretch);
-  [[nodiscard]] std::string save_failed(const Mechanics& mechanics);
+  [[nodiscard]] std::string save_failed();
 
   Body& body_;
   const Scene& scene_;
@@ -171,6 +171,9 @@ class Run {
 };
 
 EquilibriumResult Run::solve(Mechanics& mechanics) {
+  const LoadStepHooks* hooks = options_.hooks.get();
+  const LoadStepSolver solver =
+      hooks && hooks->make_solver ? hooks->make_solver(mechanics) : LoadStepSolver();
   tied_ = mechanics.tied_elements();
   refuse_loose_fragments(fragments_, body_, tied_, mechanics.coupled_elements(), scene_.name);
   refuse_unsupported_elements(mechanics, state_, scene_.name);
@@ -179,13 +182,13 @@ EquilibriumResult Run::solve(Mechanics& mechanics) {
     CoarseStart start;
     if (body_.cell_count() >= kLeastCellsToCoarsen)
       start = [&](Progress& stretch) { return coarse_equilibrium(stretch); };
-    return find_equilibrium(mechanics, state_, scene_.run, progress_, start, options_.hooks.get());
+    return find_equilibrium(mechanics, state_, scene_.run, progress_, start, hooks, solver);
   } catch (const OverloadError& error) {
-    throw OverloadError(error.what() + save_failed(mechanics));
+    throw OverloadError(error.what() + save_failed());
   } catch (const DivergedError& error) {
-    throw DivergedError(error.what() + save_failed(mechanics));
+    throw DivergedError(error.what() + save_failed());
   } catch (const TimeoutError& error) {
-    throw TimeoutError(error.what() + save_failed(mechanics));
+    throw TimeoutError(error.what() + save_failed());
   }
 }
 
@@ -219,10 +222,10 @@ std::optional<NearStart> Run::coarse_equilibrium(Progress& stretch) {
 }
 
 // Writes the last state in equilibrium; says where it is.
-std::string Run::save_failed(const Mechanics& mechanics) {
+std::string Run::save_failed() {
   const StopWaits saving;
   if (options_.failed_output.empty()) return "";
-  carry_strays(fragments_, problem_, mechanics.stencil(), state_);
+  carry_strays(fragments_, problem_, lone_elements(problem_), state_);
   move_body(body_, state_);
   body_.cell_columns.erase(kFreeStrainColumn);  // of this run only
   write_body(body_, options_.failed_output);
@@ -231,7 +234,7 @@ std::string Run::save_failed(const Mechanics& mechanics) {
 
 // A load that is as symmetric as the part does not excite the shape that it buckles into, so no load step meets buckling.
 // Nor do free strain, which acts whole from the first one on, and loads that follow, which have no energy.
-void Run::warn_of_buckling(Mechanics& mechanics, Preconditioner* near) {
+void Run::warn_of_buckling(Mechanics& mechanics, const EquilibriumResult& solved) {
   const auto drives = [](const ActiveEffect& effect) { return effect->drives(); };
   bool linked = false, follows = mechanics.follows();
   for (const Motion& motion : mechanics.constraints().motions)
@@ -243,7 +246,10 @@ void Run::warn_of_buckling(Mechanics& mechanics, Preconditioner* near) {
   const bool strained = body_.cell_columns.contains(kFreeStrainColumn);
   const bool loaded = std::any_of(mechanics.effects().begin(), mechanics.effects().end(), drives);
   if (!strained && (follows || !loaded || !judged_)) return;
-  const std::optional<bool> stable = has_positive_tangent(mechanics, state_, strained ? nullptr : near);
+  Preconditioner* near = strained ? nullptr : solved.preconditioner.get();
+  const std::optional<bool> stable = mechanics.elsewhere()
+                                         ? mechanics.elsewhere()->has_positive_tangent(state_)
+                                         : has_positive_tangent(mechanics, state_, near);
   if (stable == true) return;
   const std::string less = strained ? "less heat or shrinkage than this" : "less than this load";
   progress_.warn(
@@ -290,7 +296,7 @@ SimulateResult Run::operator()() {
   // What touches stiffens or softens the first answer, which says nothing of buckling then.
   if (from_rest && !solved.buckled && !mechanics.unilateral()) linear_reach_ = solved.linear_reach;
   const StopWaits answered;  // what is found is told: the rest takes moments
-  warn_of_buckling(mechanics, solved.preconditioner.get());
+  warn_of_buckling(mechanics, solved);
   solved.preconditioner.reset();
   buckled_ = solved.buckled;
   followers_ = follower_memory(mechanics);
@@ -300,10 +306,11 @@ SimulateResult Run::operator()() {
     for (const std::string& warning : effect->warnings(state_)) progress_.warn(warning);
   result.elastic_energy = mechanics.elastic_energy(state_);
   result.smallest_jacobian = mechanics.most_compressed(state_).value;
-  measure_corners(mechanics.cells(), body_, state_, result, progress_);
+  measure_corners(mechanics.smallest_corner_jacobian(state_), body_, result, progress_);
+  mechanics.move_cells(nullptr);
   if (options_.stress) measure_stress(problem_, state_, body_, result);
   if (options_.estimate) mark_singular(body_, tied_, result);
-  carry_strays(fragments_, problem_, mechanics.stencil(), state_);
+  carry_strays(fragments_, problem_, lone_elements(problem_), state_);
   move_body(body_, state_);
   if (scene_.run.renormalise) renormalise_all(body_, problem_, state_.displacement);
   for (const ProbePoints& probe : probes) result.probes.push_back(measure(probe, state_));

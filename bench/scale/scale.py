@@ -3,8 +3,8 @@
 
     PATH=build/release/bin:$PATH bench/scale/scale.py [--large] >docs/measurements/scale.md
 
-The case is a bar of steel, 4:1:1, held at one end with a small load across the other. --large adds a million cells. Wall seconds mean something on
-a quiet machine only; iterations, bytes and memory mean the same on any.
+The case is a bar of steel, 4:1:1, held at one end with a small load across the other. --large adds 300,000 and a million cells. Wall seconds
+mean something on a quiet machine only; iterations, bytes and memory mean the same on any.
 """
 
 import argparse
@@ -18,6 +18,7 @@ import sys
 import tempfile
 import time
 
+RANKS = (1, 2, 4)
 ENVIRONMENT = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1", OMPI_MCA_rmaps_base_oversubscribe="1",
                    OMPI_MCA_hwloc_base_binding_policy="none", OMPI_MCA_mpi_yield_when_idle="1")
 SCENE = ('material = "steel"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = ["0 N", "0 N", "-100 N"]\n'
@@ -102,11 +103,11 @@ def processor_name():
     return platform.machine()
 
 
-def gamg_table(folder, sizes):
-    print("\n## GAMG beside Flexel's own hierarchy\n\nOne process, one thread each. Flexel's hierarchy is that of `flexel-simulate` "
-          "([theory/solver.md](../theory/solver.md)), which is not offered to PETSc. Linear seconds: preconditioner and conjugate gradients; with PETSc also "
-          "assembly, forces and energies.\n")
-    head("cells", "unknowns", "CG with GAMG", "CG with Flexel's", "linear s with GAMG", "linear s with Flexel's", "largest difference of the end, relative")
+def hierarchy_table(folder, sizes):
+    print("\n## Beside flexel-simulate\n\nOne process, one thread each. `flexel-simulate` has Flexel's hierarchy on all levels "
+          "([theory/solver.md](../theory/solver.md)), `flexel-simulate-mpi` has it on the elements, and PETSc's GAMG below. Linear seconds: preconditioner and conjugate "
+          "gradients; with PETSc also assembly, forces and energies.\n")
+    head("cells", "unknowns", "CG", "CG of flexel-simulate", "linear s", "linear s of flexel-simulate", "largest difference of the end, relative")
     for sides in sizes:
         body = bar(folder, sides)
         petsc, own = solve(folder, body, 1), solve(folder, body, 0)
@@ -116,6 +117,24 @@ def gamg_table(folder, sizes):
 
 def memory_words(found):
     return f"{found['memory'][0] / 1e6:,.0f}", f"{max(found['memory'][1:], default=0) / 1e6:,.0f}" if found["ranks"] > 1 else "-"
+
+
+def memory_table(folder, cases):
+    print("\n## Memory\n\nPeak of each process (the kernel's ru_maxrss). Base: what a rank takes for a bar of 16 cells, which is PETSc, MPI and the program. Share: the largest "
+          "rank's peak times the ranks over the peak of one rank alone, both less their base: 1 is what cutting can give at best, 1.3 is asked. A body in pieces (`.pvtu`, as many "
+          "as ranks) takes the same, but for what rank 0 joins them with before the run.\n")
+    base = {ranks: max(solve(folder, bar(folder, (16, 1, 1)), ranks)["memory"]) for ranks in RANKS}
+    head("cells", "ranks", "base MB", "MB of rank 0", "MB of the largest other", "share")
+    results = []
+    for sides in cases:
+        one = None
+        for ranks in RANKS:
+            found = solve(folder, bar(folder, sides), ranks)
+            results.append((sides, found))
+            own = max(found["memory"]) - base[ranks]
+            one = one or own
+            row(f"{found['cells']:,}", ranks, f"{base[ranks] / 1e6:,.0f}", *memory_words(found), f"{own * ranks / one:.2f}")
+    return results
 
 
 def scaling_table(folder, title, words, cases):
@@ -142,8 +161,8 @@ def message_table(results):
         faces = 2 * (ranks - 1)
         row(f"{found['cells']:,}", ranks, f"{found['cells'] // ranks:,}", f"{calls:,}", f"{messages * length / calls:,.0f}",
             f"{24 * (sides[1] + 1) * (sides[2] + 1) * faces:,}", f"{messages / calls:.1f}", f"{reductions / max(1, found['cg_iterations']):.1f}")
-    print("\nAssembly of a tangent sends the rows of those faces once (27 blocks of 72 bytes an element), a residual their forces, 24 bytes an element. Rank 0 hands "
-          "out and takes back all displacements once a load step, 24 bytes an element, and sends each rank its piece once a run.")
+    print("\nA new tangent sends the diagonal blocks of those faces' elements, 72 bytes each, and what a rank's cells make of the groups of others there; a residual forces, "
+          "24 bytes an element. Rank 0 hands out and takes back all displacements once a load step, 24 bytes an element, and sends each rank its piece once a run.")
 
 
 def memory_fit(results):
@@ -173,10 +192,10 @@ def billion(results):
 | memory a rank, its piece | {(base + piece * each) / 1e9:.1f} GB | {base / 1e6:,.0f} MB and {piece:,.0f} bytes a cell: the difference of the largest and the smallest rank above |
 | memory of rank 0 besides | {whole * cells / 1e9:,.0f} GB | {whole:,.0f} bytes a cell of the whole body, rank 0 above less its piece |
 | bytes a product and rank, finest level | {2 * face / 1e6:.1f} MB | two faces of {side:,.0f} x {side:,.0f} elements, 24 bytes each |
-| bytes a tangent and rank | {2 * 27 * 72 * side * side / 1e9:.2f} GB | 27 blocks of 72 bytes an element of those faces |
+| bytes a tangent and rank | {2 * 72 * side * side / 1e6:.1f} MB | a block of 72 bytes an element of those faces |
 | processor seconds a rank | {least * each * iterations:,.0f} s | {least * 1e6:.1f} us a cell and CG iteration, all of the run on one rank above, and {iterations} iterations, the most above |
 
-So rank 0 is what stops it: it holds the whole body, and a machine of 1 TB ends near {1e12 / max(whole, 1) / 1e9:.1f} billion cells of slabs. Slabs of a bar 4:1:1 cut in 1,000 are {4 * side / 1000:.1f} cells
+So rank 0 is what stops it: it holds the whole body, and a machine of 1 TB ends near {1e12 / max(whole, 1) / 1e9:.1f} billion cells. Slabs of a bar 4:1:1 cut in 1,000 are {4 * side / 1000:.1f} cells
 thick, with as many elements on their faces as within: so many ranks want another cut. And PETSc as Debian builds it counts unknowns in 32 bits, which end at 2.1e9 (3e9 are needed):
 `libpetsc64-real-dev` has 64.""")
 
@@ -222,12 +241,13 @@ def main():
 Printed by `bench/scale/scale.py{' --large' if options.large else ''}` on {os.cpu_count()} cores ({processor_name()}), load average {os.getloadavg()[0]:.1f} when it began. A bar of steel, 4:1:1, held at one end, with a small
 load across the other; `flexel-simulate-mpi` without error bars and stresses. Wall and linear seconds are those of a machine with that load; more ranks than cores
 share them.""")
-        gamg_table(folder, [(56, 14, 14), (116, 29, 29)] + ([(252, 63, 63)] if options.large else []))
+        hierarchy_table(folder, [(56, 14, 14), (116, 29, 29)] + ([(252, 63, 63)] if options.large else []))
+        large = memory_table(folder, [(116, 29, 29)] + ([(168, 42, 42)] if options.large else []))
         results = scaling_table(folder, "Strong scaling", "The same body on more ranks.", [((88, 22, 22), ranks) for ranks in (1, 2, 4)])
         results += scaling_table(folder, "Weak scaling", "As many cells for each rank: the bar grows along its length.",
                                  [((40 * ranks, 16, 16), ranks) for ranks in (1, 2, 4)])
         message_table(results)
-        billion(results)
+        billion(results + large)
         yardstick(folder, options.ex56, results)
 
 

@@ -182,9 +182,11 @@ void read_moments(const vtu::File& file, Body& body) {
 
 vtu::File open_body(Bytes bytes, const std::string& where) {
   if (vtu::is_file_of(bytes, "PUnstructuredGrid"))
-    throw InputError(where,
-                     "lists the pieces of a lattice, and one body is needed here: name one of its pieces "
-                     "(.vtu), or let flexel-voxelize write the whole, without --pieces");
+    throw InputError(
+        where,
+        "lists the pieces of a lattice, which flexel-simulate-mpi and flexel-map take, and one body is "
+        "needed here: name one of its pieces (.vtu), or let flexel-voxelize write the whole, without "
+        "--pieces");
   if (!looks_like_body(bytes))
     throw InputError(where,
                      "is not a body file: one written by flexel-voxelize or flexel-simulate is needed");

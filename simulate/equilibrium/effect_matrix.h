@@ -11,4 +11,8 @@ namespace flexel::simulate {
 [[nodiscard]] BlockMatrix matrix_of_effects(const Body& body, const BlockMatrix& pattern,
                                             const std::vector<ActiveEffect>& effects);
 
+// Likewise without a pattern: where elements are coupled by the cells with active[cell] != 0 alone.
+[[nodiscard]] BlockMatrix matrix_of_effects(const Body& body, const std::vector<std::uint8_t>& active,
+                                            const std::vector<ActiveEffect>& effects);
+
 }  // namespace flexel::simulate

@@ -22,6 +22,7 @@
 #include <limits>
 #include <numbers>
 
+#include "base/disjoint_sets.h"
 #include "base/error.h"
 #include "base/human.h"
 #include "base/math/eigenvalues.h"
@@ -117,18 +118,18 @@ struct LinearReach {
 class LoadStepping {
  public:
   LoadStepping(Mechanics& mechanics, State& state, const RunSettings& settings, Progress& progress,
-               const CoarseStart& start, const LoadStepHooks* hooks)
+               const CoarseStart& start, const LoadStepHooks* hooks, const LoadStepSolver& solver)
       : mechanics_(mechanics),
         state_(state),
         settings_(settings),
         progress_(progress),
         start_(start),
         hooks_(hooks),
+        solver_(solver),
         beginning_{state.displacement, follower_memory(mechanics), links_now(mechanics.constraints())},
         first_(1.0 / std::max(settings.load_steps, least_load_steps(mechanics))),
         length_(first_),
         unilateral_(mechanics.unilateral()) {
-    if (hooks && hooks->make_solver) solver_ = hooks->make_solver(mechanics);
     if (!hooks || !hooks->begin) return;
     done_ = hooks->begin->share;
     reach_.first = hooks->begin->reach;
@@ -182,8 +183,8 @@ class LoadStepping {
   const RunSettings& settings_;
   Progress& progress_;
   const CoarseStart& start_;
-  const LoadStepHooks* hooks_;  // may be null
-  LoadStepSolver solver_;       // empty: newton_with_links()
+  const LoadStepHooks* hooks_;    // may be null
+  const LoadStepSolver& solver_;  // empty: newton_with_links()
   const RunBeginning beginning_;
   double first_;  // share of the load: the first step; none is longer
   LoadStepLength length_;
@@ -510,7 +511,47 @@ FollowerMemory follower_memory(const Mechanics& mechanics) {
   return memory;
 }
 
-void refuse_free_motions(Mechanics& mechanics, const State& start, const std::string& scene) {
+namespace {
+
+// Elements that cells couple, but for those that are held in all directions.
+std::vector<std::vector<std::uint32_t>> coupled_by_cells(const Mechanics& mechanics) {
+  const Body& body = mechanics.body();
+  const std::vector<std::uint8_t>&mask = mechanics.constraints().mask, active = mechanics.active();
+  DisjointSets sets(body.element_count());
+  for (std::size_t c = 0; c < active.size(); ++c) {
+    if (!active[c]) continue;
+    std::optional<std::uint32_t> first;
+    for (const std::uint32_t e : body.cell_elements[c]) {
+      if (mask[e] == 7) continue;
+      if (first) sets.unite(*first, e);
+      if (!first) first = e;
+    }
+  }
+  const std::vector<std::uint32_t> number = sets.numbered();
+  std::vector<std::vector<std::uint32_t>> groups;
+  std::vector<std::uint32_t> group(number.size(), 0);  // by set; 0: none yet
+  for (std::uint32_t e = 0; e < number.size(); ++e) {
+    if (mask[e] == 7) continue;
+    std::uint32_t& own = group[number[e]];
+    if (own == 0) {
+      groups.emplace_back();
+      own = static_cast<std::uint32_t>(groups.size());
+    }
+    groups[own - 1].push_back(e);
+  }
+  return groups;
+}
+
+std::vector<FreeMotion> free_motions_elsewhere(Mechanics& mechanics, const State& start) {
+  CellsElsewhere& cells = *mechanics.elsewhere();
+  return free_motions(
+      MatrixElsewhere{coupled_by_cells(mechanics),
+                      [&](const std::vector<Vec3>& x, std::vector<Vec3>& y) { cells.multiply(x, y); },
+                      cells.diagonal()},
+      node_geometry(mechanics.body(), start));
+}
+
+std::vector<FreeMotion> free_motions_here(Mechanics& mechanics, const State& start) {
   // Without the stresses that a rest shape gives the body where it starts: what they do to a motion as a whole
   // says nothing of what holds it.
   const bool stressed = RestShapes(mechanics.body()).any();
@@ -520,8 +561,14 @@ void refuse_free_motions(Mechanics& mechanics, const State& start, const std::st
   begun.share = 0;
   mechanics.assemble(begun, {false, stressed ? &none : nullptr});
   mechanics.eliminate_prescribed();
+  return free_motions(mechanics.tangent(), node_geometry(mechanics.body(), start));
+}
+
+}  // namespace
+
+void refuse_free_motions(Mechanics& mechanics, const State& start, const std::string& scene) {
   const std::vector<FreeMotion> free =
-      free_motions(mechanics.tangent(), node_geometry(mechanics.body(), start));
+      mechanics.elsewhere() ? free_motions_elsewhere(mechanics, start) : free_motions_here(mechanics, start);
   if (free.empty()) return;
   std::vector<std::string> names;
   for (const FreeMotion& motion : free) {
@@ -561,8 +608,9 @@ void refuse_unsupported_elements(Mechanics& mechanics, const State& start, const
 }
 
 EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state, const RunSettings& settings,
-                                   Progress& progress, const CoarseStart& start, const LoadStepHooks* hooks) {
-  return LoadStepping(mechanics, state, settings, progress, start, hooks)();
+                                   Progress& progress, const CoarseStart& start, const LoadStepHooks* hooks,
+                                   const LoadStepSolver& solver) {
+  return LoadStepping(mechanics, state, settings, progress, start, hooks, solver)();
 }
 
 }  // namespace flexel::simulate

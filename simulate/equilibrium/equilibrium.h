@@ -66,7 +66,8 @@ struct LoadStepDone {
   std::vector<Vec3> displacement;  // m (elements)
 };
 
-// `make_solver` is asked once for each search for an equilibrium, those on coarser lattices too. `done` hears of each
+// `make_solver` is asked once for each search for an equilibrium, those on coarser lattices too; it may take the cells of the
+// mechanics elsewhere (Mechanics::move_cells()). `done` hears of each
 // load step that ended in equilibrium, but of none on a coarser lattice. `begin`: the load steps go on from there.
 struct LoadStepHooks {
   std::function<LoadStepSolver(Mechanics&)> make_solver;
@@ -80,6 +81,7 @@ struct LoadStepHooks {
 [[nodiscard]] EquilibriumResult find_equilibrium(Mechanics& mechanics, State& state,
                                                  const RunSettings& settings, Progress& progress,
                                                  const CoarseStart& start = {},
-                                                 const LoadStepHooks* hooks = nullptr);
+                                                 const LoadStepHooks* hooks = nullptr,
+                                                 const LoadStepSolver& solver = {});
 
 }  // namespace flexel::simulate

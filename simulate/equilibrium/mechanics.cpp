@@ -10,6 +10,7 @@
 #include "base/math/eigenvalues.h"
 #include "base/parallel.h"
 #include "simulate/equilibrium/effect_matrix.h"
+#include "simulate/matter/fragments.h"
 #include "simulate/thermal/free_strain.h"
 
 namespace flexel::simulate {
@@ -28,41 +29,54 @@ bool holds_all_directions(const Block& tie) {
 }
 
 // Elements that nothing resists at (of loose crumbs) stay where they are; in time their inertia carries them.
-Constraints initial_constraints(const Problem& problem, const Stencil& stencil, const PaperModel& paper) {
+Constraints initial_constraints(const Problem& problem, const PaperModel& paper) {
   const Body& body = problem.body;
   Constraints constraints;
   constraints.mask.assign(body.element_count(), 0);
   constraints.motion.assign(body.element_count(), {0, 0, 0});
   constraints.motions.push_back({});
   constraints.courses.push_back({});
-  for (std::uint32_t e = 0; !problem.duration && e < body.element_count(); ++e)
-    if (stencil.of(e).empty() && !paper.active()[e]) constraints.mask[e] = 7;
+  if (problem.duration) return constraints;
+  const std::vector<std::uint8_t> lone = lone_elements(problem);
+  for (std::uint32_t e = 0; e < body.element_count(); ++e)
+    if (lone[e] && !paper.active()[e]) constraints.mask[e] = 7;
   return constraints;
 }
 
 }  // namespace
 
+// Where an effect adds to elements that it does not pull at, the matrix is stored after all.
+Mechanics::Lattice::Lattice(const Problem& problem, const PaperModel& paper,
+                            const std::vector<ActiveEffect>& effects, bool as_stored)
+    : pattern(
+          stiffness_pattern(problem.body, active_cells(problem), paper.rows(), coupled(effects), as_stored)),
+      cells(problem, pattern.stencil),
+      stored(pattern.matrix) {
+  if (as_stored) return;
+  made.emplace(problem, pattern, effects);
+  const State rest{std::vector<Vec3>(problem.body.element_count(), Vec3::Zero()), 1};
+  try {
+    for (const ActiveEffect& effect : effects) effect->add_stiffness(rest, made->added());
+  } catch (const MissingBlock&) {
+    made.reset();
+    pattern.matrix.values.assign(pattern.matrix.columns.size(), Block::Zero());
+  }
+}
+
 Mechanics::Mechanics(const Problem& problem, std::vector<ActiveEffect> effects, StiffnessStorage storage)
-    : body_(problem.body),
+    : problem_(problem),
+      body_(problem.body),
       paper_(problem),
       stored_(storage == StiffnessStorage::stored ||
               (storage == StiffnessStorage::automatic &&
                (body_.element_count() <= kStoredElements || !CellStiffness::fits(problem, paper_)))),
-      pattern_(
-          stiffness_pattern(problem.body, active_cells(problem), paper_.rows(), coupled(effects), stored_)),
-      cells_(problem, pattern_.stencil),
       effects_(std::move(effects)),
-      constraints_(initial_constraints(problem, pattern_.stencil, paper_)) {
+      constraints_(initial_constraints(problem, paper_)) {
   for (const ActiveEffect& effect : effects_) effect->constrain(constraints_);
   if (body_.cell_columns.contains(kFreeStrainColumn)) {
     std::vector<Vec3> free(body_.element_count(), Vec3::Zero());
-    cells_.add_forces({free, 1}, free);
+    lattice().cells.add_forces({free, 1}, free);
     free_scale_ = std::sqrt(squared_norm(free));
-  }
-  if (!stored_) make_tangent(problem);
-  if (stored_) {
-    stored_tangent_ = std::make_unique<StoredMatrix>(pattern_.matrix);
-    tangent_ = stored_tangent_.get();
   }
   follow_loads();
 }
@@ -73,25 +87,12 @@ void Mechanics::follow_loads() {
 }
 
 FollowedTangent Mechanics::followed(bool symmetric) const {
-  return {*tangent_, constraints_.mask,
+  return {tangent(), constraints_.mask,
           [this](const std::vector<Vec3>& along, bool transposed, std::vector<Vec3>& change) {
             for (const ActiveEffect& effect : effects_)
               if (effect->follows()) effect->add_force_change(linearised_, along, transposed, change);
           },
           symmetric};
-}
-
-// Where an effect adds to elements that it does not pull at, the matrix is stored after all.
-void Mechanics::make_tangent(const Problem& problem) {
-  tangent_ = &made_.emplace(problem, pattern_, effects_);
-  const State rest{std::vector<Vec3>(body_.element_count(), Vec3::Zero()), 1};
-  try {
-    for (const ActiveEffect& effect : effects_) effect->add_stiffness(rest, made_->added());
-  } catch (const MissingBlock&) {
-    made_.reset();
-    stored_ = true;
-    pattern_.matrix.values.assign(pattern_.matrix.columns.size(), Block::Zero());
-  }
 }
 
 std::vector<CoupledElements> Mechanics::coupled(const std::vector<ActiveEffect>& effects) {
@@ -105,7 +106,7 @@ double Mechanics::energy(const State& state) {
   double energy = 0;
   {
     const ScopeTimer timer(cell_seconds_);
-    energy = cells_.energy(state);
+    energy = cells().energy(state);
   }
   {
     const ScopeTimer timer(paper_seconds_);
@@ -115,10 +116,21 @@ double Mechanics::energy(const State& state) {
   return energy;
 }
 
+double Mechanics::elastic_energy(const State& state) {
+  return (elsewhere_ ? elsewhere_->figures(state).energy : cells().energy(state)) + paper_.energy(state);
+}
+
+SmallestJacobian Mechanics::smallest_corner_jacobian(const State& state) const {
+  return elsewhere_ ? elsewhere_->figures(state).smallest_corner : cells().smallest_corner_jacobian(state);
+}
+
 void Mechanics::add_elastic_forces(const State& state, std::vector<Vec3>& forces) {
   {
     const ScopeTimer timer(cell_seconds_);
-    cells_.add_forces(state, forces);
+    if (elsewhere_)
+      elsewhere_->add_forces(state, forces);
+    else
+      lattice().cells.add_forces(state, forces);
   }
   const ScopeTimer timer(paper_seconds_);
   paper_.add_forces(state, forces);
@@ -152,7 +164,7 @@ std::vector<Vec3> Mechanics::forces_of_effects(const State& state) const {
 }
 
 BlockMatrix Mechanics::stiffness_of_effects(const State& state) const {
-  BlockMatrix matrix = matrix_of_effects(body_, pattern_.matrix, effects_);
+  BlockMatrix matrix = matrix_of_effects(body_, active(), effects_);
   for (const ActiveEffect& effect : effects_) effect->add_stiffness(state, matrix);
   return matrix;
 }
@@ -161,23 +173,23 @@ void Mechanics::assemble(const State& state, const TangentOptions& tangent) {
   if (follows()) linearised_ = state;
   {
     const ScopeTimer timer(cell_seconds_);
-    if (made_)
-      made_->linearise(state, tangent);
+    if (lattice().made)
+      lattice().made->linearise(state, tangent);
     else
-      cells_.set_stiffness(state, tangent, pattern_.matrix);
+      lattice().cells.set_stiffness(state, tangent, lattice().pattern.matrix);
   }
-  if (!made_) {
+  if (!lattice().made) {
     const ScopeTimer timer(paper_seconds_);
-    paper_.add_stiffness(state, tangent.project, pattern_.matrix);
+    paper_.add_stiffness(state, tangent.project, lattice().pattern.matrix);
   }
-  for (const ActiveEffect& effect : effects_) effect->add_stiffness(state, added_stiffness());
+  for (const ActiveEffect& effect : effects_) effect->add_stiffness(state, lattice().added());
 }
 
 void Mechanics::eliminate_prescribed() {
-  if (made_)
-    made_->eliminate_prescribed(constraints_);
+  if (lattice().made)
+    lattice().made->eliminate_prescribed(constraints_);
   else
-    eliminate(constraints_, pattern_.matrix);
+    eliminate(constraints_, lattice().pattern.matrix);
 }
 
 bool Mechanics::renew_effects(const State& state) {
@@ -196,7 +208,8 @@ bool Mechanics::unilateral() const {
 MostCompressed Mechanics::most_compressed(const State& state) const {
   MostCompressed most;
   if (body_.cell_count() > 0) {
-    const SmallestJacobian cell = cells_.smallest_jacobian(state);
+    const SmallestJacobian cell =
+        elsewhere_ ? elsewhere_->figures(state).smallest : cells().smallest_jacobian(state);
     const std::uint32_t element = body_.cell_elements[cell.cell][0];
     most = {cell.value, fmt::format("cell {}", cell.cell), body_.rest[element],
             element_parts(body_)[element]};
@@ -210,7 +223,9 @@ MostCompressed Mechanics::most_compressed(const State& state) const {
 
 std::vector<std::uint8_t> Mechanics::tied_elements() {
   std::vector<std::uint8_t> tied(body_.element_count(), 0);
-  BlockMatrix& matrix = added_stiffness();
+  BlockMatrix near_effects;
+  if (elsewhere_) near_effects = matrix_of_effects(body_, active(), effects_);
+  BlockMatrix& matrix = elsewhere_ ? near_effects : lattice().added();
   std::fill(matrix.values.begin(), matrix.values.end(), Block::Zero());
   const State rest{std::vector<Vec3>(body_.element_count(), Vec3::Zero()), 1};
   for (const ActiveEffect& effect : effects_)

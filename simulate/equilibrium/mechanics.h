@@ -25,12 +25,32 @@ struct MostCompressed {
   std::uint32_t part = 0;
 };
 
+// What other processes do of the mechanics of the cells (distributed/team.h), for a body at equilibrium that they share.
+class CellsElsewhere {
+ public:
+  virtual ~CellsElsewhere() = default;
+  struct Figures {
+    double energy = 0;  // J
+    SmallestJacobian smallest, smallest_corner;
+  };
+  [[nodiscard]] virtual Figures figures(const State& state) = 0;
+  // Adds the forces of the cells on their elements [N].
+  virtual void add_forces(const State& state, std::vector<Vec3>& forces) = 0;
+  // simulate/equilibrium/positive_tangent.h
+  [[nodiscard]] virtual std::optional<bool> has_positive_tangent(const State& state) = 0;
+  // The product with the tangent at rest, effects added and prescribed components eliminated, and its diagonal [N/m]; 0 at elements
+  // of no cell that resists.
+  virtual void multiply(const std::vector<Vec3>& x, std::vector<Vec3>& y) = 0;
+  [[nodiscard]] virtual std::vector<Vec3> diagonal() = 0;
+};
+
 // Whether the tangent stiffness is stored: `automatic` where it is small or CellStiffness does not fit.
 enum class StiffnessStorage { automatic, stored, made };
 
 class Mechanics {
  public:
-  // `problem`'s body must outlive it. `made`: CellStiffness must fit.
+  // `problem`'s body must outlive it. `made`: CellStiffness must fit. What is made of the cells takes some 800 bytes a cell beside
+  // the body.
   Mechanics(const Problem& problem, std::vector<ActiveEffect> effects,
             StiffnessStorage storage = StiffnessStorage::automatic);
   Mechanics(const Mechanics&) = delete;
@@ -38,39 +58,38 @@ class Mechanics {
 
   [[nodiscard]] const Body& body() const { return body_; }
   [[nodiscard]] const Constraints& constraints() const { return constraints_; }
-  [[nodiscard]] const Stencil& stencil() const { return pattern_.stencil; }
-  [[nodiscard]] const Cells& cells() const { return cells_; }
+  [[nodiscard]] const Stencil& stencil() const { return lattice().pattern.stencil; }
+  [[nodiscard]] const Cells& cells() const { return lattice().cells; }
   [[nodiscard]] const PaperModel& paper() const { return paper_; }
   // The tangent at the last assemble().
-  [[nodiscard]] const LinearOperator& tangent() const { return *tangent_; }
+  [[nodiscard]] const LinearOperator& tangent() const { return lattice().tangent(); }
   // Some load follows the shape (Effect::follows()): the energy tells nothing of it.
   [[nodiscard]] bool follows() const { return followed_.has_value(); }
   // Some effect is (Effect::unilateral()).
   [[nodiscard]] bool unilateral() const;
   // Likewise with what such loads add, not symmetric; tangent() where none follows.
   [[nodiscard]] const LinearOperator& whole_tangent() const {
-    return follows() ? static_cast<const LinearOperator&>(*followed_) : *tangent_;
+    return follows() ? static_cast<const LinearOperator&>(*followed_) : tangent();
   }
   // Likewise; `symmetric`: its symmetric part.
   [[nodiscard]] FollowedTangent followed(bool symmetric) const;
   // Likewise, where it is stored.
   [[nodiscard]] const BlockMatrix& stiffness() const {
-    assert(stored_);
-    return pattern_.matrix;
+    assert(!lattice().made);
+    return lattice().pattern.matrix;
   }
   [[nodiscard]] const std::vector<ActiveEffect>& effects() const { return effects_; }
 
   // Total energy [J]; infinity where a cell or an element has J <= 0.
   [[nodiscard]] double energy(const State& state);
-  [[nodiscard]] double elastic_energy(const State& state) {
-    return cells_.energy(state) + paper_.energy(state);
-  }
+  [[nodiscard]] double elastic_energy(const State& state);
   // Adds the forces of the models alone [N] (elements).
   void add_elastic_forces(const State& state, std::vector<Vec3>& forces);
   [[nodiscard]] MostCompressed most_compressed(const State& state) const;
+  [[nodiscard]] SmallestJacobian smallest_corner_jacobian(const State& state) const;
   [[nodiscard]] Forces forces(const State& state);
   // What effects alone do: their forces [N] (elements), and their stiffness [N/m], which must couple only elements of
-  // one cell.
+  // one cell that they pull at.
   [[nodiscard]] std::vector<Vec3> forces_of_effects(const State& state) const;
   [[nodiscard]] BlockMatrix stiffness_of_effects(const State& state) const;
   // Tangent stiffness into tangent(), prescribed components not yet eliminated.
@@ -88,24 +107,50 @@ class Mechanics {
 
   [[nodiscard]] bool has_free_strain() const { return free_scale_ > 0; }
   // From here on it acts in proportion to State::share, or whole.
-  void grow_free_strain(bool grows) { cells_.grow_free_strain(grows); }
+  void grow_free_strain(bool grows) { lattice().cells.grow_free_strain(grows); }
+
+  // From here on, or until null is given, others do what a CellsElsewhere does, and what is made of the cells here is freed; what else
+  // needs it makes it again. All effects must be constant loads and supports.
+  void move_cells(std::shared_ptr<CellsElsewhere> to) {
+    elsewhere_ = std::move(to);
+    lattice_.reset();
+  }
+  [[nodiscard]] CellsElsewhere* elsewhere() const { return elsewhere_.get(); }
+  // (cells) 1: resists
+  [[nodiscard]] std::vector<std::uint8_t> active() const { return active_cells(problem_); }
 
  private:
-  static std::vector<CoupledElements> coupled(const std::vector<ActiveEffect>& effects);
-  void make_tangent(const Problem& problem);
-  void follow_loads();
-  // Where effects add their stiffness.
-  [[nodiscard]] BlockMatrix& added_stiffness() { return made_ ? made_->added() : pattern_.matrix; }
+  // What is made of the cells.
+  struct Lattice {
+    Lattice(const Problem& problem, const PaperModel& paper, const std::vector<ActiveEffect>& effects,
+            bool stored);
+    Lattice(const Lattice&) = delete;
+    Lattice& operator=(const Lattice&) = delete;
+    [[nodiscard]] const LinearOperator& tangent() const {
+      return made ? static_cast<const LinearOperator&>(*made) : stored;
+    }
+    // Where effects add their stiffness.
+    [[nodiscard]] BlockMatrix& added() { return made ? made->added() : pattern.matrix; }
 
+    StiffnessPattern pattern;
+    Cells cells;
+    std::optional<CellStiffness> made;  // nothing where the matrix of the pattern has values
+    StoredMatrix stored;
+  };
+  static std::vector<CoupledElements> coupled(const std::vector<ActiveEffect>& effects);
+  void follow_loads();
+  [[nodiscard]] Lattice& lattice() const {
+    if (!lattice_) lattice_ = std::make_unique<Lattice>(problem_, paper_, effects_, stored_);
+    return *lattice_;
+  }
+
+  Problem problem_;
   const Body& body_;
   PaperModel paper_;
   bool stored_;
-  StiffnessPattern pattern_;
-  Cells cells_;
   std::vector<ActiveEffect> effects_;
-  std::optional<CellStiffness> made_;  // nothing where the matrix of the pattern has values
-  std::unique_ptr<LinearOperator> stored_tangent_;
-  const LinearOperator* tangent_ = nullptr;
+  mutable std::unique_ptr<Lattice> lattice_;   // null until it is asked for
+  std::shared_ptr<CellsElsewhere> elsewhere_;  // null: all is done here
   Constraints constraints_;
   std::optional<FollowedTangent> followed_;
   State linearised_;       // of the last assemble(), where loads follow

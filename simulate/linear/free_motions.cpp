@@ -80,18 +80,18 @@ struct Work {
 };
 
 // Each group moves about its own centre, one motion after the other: A times all six is never held.
-std::vector<Restriction> restrict_to_rigid(const LinearOperator& matrix, const std::vector<Rows>& groups,
-                                           const std::vector<Frame>& frames,
+std::vector<Restriction> restrict_to_rigid(const MatrixElsewhere& matrix, const std::vector<Frame>& frames,
                                            const std::vector<Vec3>& position) {
+  const std::vector<Rows>& groups = matrix.groups;
   std::vector<Restriction> result(groups.size());
-  std::vector<Vec3> moved(matrix.rows()), force(matrix.rows());
+  std::vector<Vec3> moved(position.size(), Vec3::Zero()), force(position.size());
   for (Eigen::Index motion = 0; motion < 6; ++motion) {
     for (std::size_t g = 0; g < groups.size(); ++g)
       parallel_for_each(groups[g].size(), [&](std::size_t r) {
         const std::uint32_t i = groups[g][r];
         moved[i] = frames[g].at(position[i]).col(motion);
       });
-    multiply(matrix, moved, force);
+    matrix.multiply(moved, force);
     for (std::size_t g = 0; g < groups.size(); ++g) {
       const Work work = parallel_sum<Work>(groups[g].size(), [&](std::size_t r) {
         const std::uint32_t i = groups[g][r];
@@ -100,7 +100,6 @@ std::vector<Restriction> restrict_to_rigid(const LinearOperator& matrix, const s
       result[g].energy.col(motion) = work.of;
     }
   }
-  const std::vector<Block> diagonal = matrix.diagonal();
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const double share = 1 / static_cast<double>(groups[g].size());
     result[g] += parallel_sum<Restriction>(groups[g].size(), [&](std::size_t r) {
@@ -108,7 +107,7 @@ std::vector<Restriction> restrict_to_rigid(const LinearOperator& matrix, const s
       const Movements own = frames[g].at(position[i]);
       Restriction term;
       term.size = share * own.transpose() * own;
-      term.stiffness = share * diagonal[i].trace() / 3;
+      term.stiffness = share * matrix.diagonal[i].sum() / 3;
       return term;
     });
   }
@@ -175,11 +174,20 @@ std::string axis_name(const Vec3& direction) {
 
 std::vector<FreeMotion> free_motions(const LinearOperator& matrix, const NodeGeometry& geometry,
                                      double threshold) {
+  MatrixElsewhere same{connected_groups(matrix),
+                       [&](const std::vector<Vec3>& x, std::vector<Vec3>& y) { multiply(matrix, x, y); },
+                       {}};
+  for (const Block& block : matrix.diagonal()) same.diagonal.emplace_back(block.diagonal());
+  return free_motions(same, geometry, threshold);
+}
+
+std::vector<FreeMotion> free_motions(const MatrixElsewhere& matrix, const NodeGeometry& geometry,
+                                     double threshold) {
   std::vector<FreeMotion> motions;
-  const std::vector<Rows> groups = connected_groups(matrix);
+  const std::vector<Rows>& groups = matrix.groups;
   std::vector<Frame> frames;
   for (const Rows& rows : groups) frames.push_back(group_frame(rows, geometry.position));
-  const std::vector<Restriction> restrictions = restrict_to_rigid(matrix, groups, frames, geometry.position);
+  const std::vector<Restriction> restrictions = restrict_to_rigid(matrix, frames, geometry.position);
   // The energy of a motion of unit mean square size, beside that of one element moved alone.
   for (std::size_t g = 0; g < groups.size(); ++g)
     tell(free_space(restrictions[g], threshold * restrictions[g].stiffness), geometry.part[groups[g].front()],

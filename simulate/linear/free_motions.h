@@ -1,5 +1,6 @@
 // Rigid motions that supports leave free.
 #pragma once
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,15 @@ struct FreeMotion {
                                                    double threshold = 1e-9);
 [[nodiscard]] std::vector<FreeMotion> free_motions(const BlockMatrix& matrix, const NodeGeometry& geometry,
                                                    double threshold = 1e-9);
+
+// Likewise of a matrix that is elsewhere: `groups` of its rows that are coupled, ascending; y = A x; its diagonal [N/m] (rows x 3).
+struct MatrixElsewhere {
+  std::vector<std::vector<std::uint32_t>> groups;
+  std::function<void(const std::vector<Vec3>& x, std::vector<Vec3>& y)> multiply;
+  std::vector<Vec3> diagonal;
+};
+[[nodiscard]] std::vector<FreeMotion> free_motions(const MatrixElsewhere& matrix,
+                                                   const NodeGeometry& geometry, double threshold = 1e-9);
 
 // "translate along x", "rotate about (0.71, 0.71, 0.00)".
 [[nodiscard]] std::string motion_name(const FreeMotion& motion);

@@ -4,6 +4,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "base/math/eigenvalues.h"
 #include "simulate/linear/block_inverse.h"
 #include "simulate/linear/transfer.h"
 
@@ -38,6 +39,30 @@ struct Level {
   // (rows x R) likewise, of an operator: A times a vector, and D^-1 times a residual
   mutable std::vector<double> image, scaled;
 };
+
+// Weight of the step that smooths the prolongator; the estimate is from below, hence 1.05.
+[[nodiscard]] inline double smoothing_weight(double largest_eigenvalue) {
+  return 4. / 3 / (1.05 * largest_eigenvalue);
+}
+
+// Directions in which a support holds element i directly: moving i and its neighbours together along such a
+// direction is resisted nearly as much as moving i alone (elastic links do not resist that at all). Returns
+// the projector on the other directions. A coarse motion must leave held elements alone: one that drags them
+// against a penalty of hundreds of E / h would cost so much that the free elements of the same aggregate
+// would get no coarse motion either.
+// `sum`: of the blocks of its row, `own`: the diagonal one.
+[[nodiscard]] inline Mat3 free_directions(const Mat3& sum, const Mat3& own) {
+  constexpr double kHeldShare = .5;
+  if (sum.norm() < .1 * own.norm()) return Mat3::Identity();
+  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(Mat3(.5 * (sum + sum.transpose())));
+  Mat3 projector = Mat3::Identity();
+  for (int c = 0; c < 3; ++c) {
+    const Vec3 direction = eigen.eigenvectors().col(c);
+    if (eigen.eigenvalues()[c] > kHeldShare * direction.dot(own * direction))
+      projector -= direction * direction.transpose();
+  }
+  return projector;
+}
 
 constexpr std::size_t kRowGrain = 256;
 

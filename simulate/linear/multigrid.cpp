@@ -34,11 +34,6 @@ MatrixView<BlockType> view(const Pattern& pattern, const std::vector<BlockType>&
   return {pattern.offsets, pattern.columns, values};
 }
 
-// Weight of the step that smooths the prolongator; the estimate is from below, hence 1.05.
-double smoothing_weight(double largest_eigenvalue) {
-  return 4. / 3 / (1.05 * largest_eigenvalue);
-}
-
 Grouping grouping(const LevelNodes& fine, const Aggregates& aggregates) {
   Grouping result{
       aggregates.of, std::vector<Vec3>(fine.index.size(), Vec3::Zero()), {}, aggregates.nodes.reach};
@@ -50,30 +45,10 @@ Grouping grouping(const LevelNodes& fine, const Aggregates& aggregates) {
   return result;
 }
 
-// Directions in which a support holds element i directly: moving i and its neighbours together along such a
-// direction is resisted nearly as much as moving i alone (elastic links do not resist that at all). Returns
-// the projector on the other directions. A coarse motion must leave held elements alone: one that drags them
-// against a penalty of hundreds of E / h would cost so much that the free elements of the same aggregate
-// would get no coarse motion either.
-// `sum`: of the blocks of its row, `own`: the diagonal one.
-Mat3 free_directions(const Mat3& sum, const Mat3& own) {
-  constexpr double kHeldShare = .5;
-  if (sum.norm() < .1 * own.norm()) return Mat3::Identity();
-  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(Mat3(.5 * (sum + sum.transpose())));
-  Mat3 projector = Mat3::Identity();
-  for (int c = 0; c < 3; ++c) {
-    const Vec3 direction = eigen.eigenvectors().col(c);
-    if (eigen.eigenvalues()[c] > kHeldShare * direction.dot(own * direction))
-      projector -= direction * direction.transpose();
-  }
-  return projector;
-}
-
 // The projectors of those rows that a support holds, ascending. The sum of a row's blocks is what moving
 // everything together is resisted with. The level's work vectors are overwritten.
-std::vector<std::pair<std::uint32_t, Mat3>> free_directions(const LinearOperator& matrix,
-                                                            const std::vector<Block>& diagonal,
-                                                            Level<3>& level) {
+std::vector<std::pair<std::uint32_t, Mat3>> restraints(const LinearOperator& matrix,
+                                                       const std::vector<Block>& diagonal, Level<3>& level) {
   constexpr std::size_t kGrain = 4096;
   const std::size_t n = matrix.rows();
   std::vector<Eigen::Matrix3f> sum(n);
@@ -105,7 +80,7 @@ std::vector<Block> make_smoother(const LinearOperator& matrix, Level<3>& level, 
 
 // Values of the prolongator, for the coarse matrix alone: the cycle applies it as RigidTransfer says.
 void refresh_transfer(const LinearOperator& matrix, RigidTransfer& rigid, Level<3>& level) {
-  rigid.restrain(free_directions(matrix, make_smoother(matrix, level, Estimate::anew), level));
+  rigid.restrain(restraints(matrix, make_smoother(matrix, level, Estimate::anew), level));
   smooth_prolongator<3>(
       OperatorView(matrix), level.inverse_diagonal, smoothing_weight(level.largest_eigenvalue),
       rigid.aggregate_of(), [&](std::size_t i) { return rigid.at(i); }, level.transfer);

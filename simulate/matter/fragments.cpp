@@ -14,6 +14,7 @@
 #include "simulate/matter/firm_groups.h"
 #include "simulate/matter/interpolation_weights.h"
 #include "simulate/models/cell_model.h"
+#include "simulate/models/cells.h"
 
 namespace flexel::simulate {
 namespace {
@@ -218,7 +219,23 @@ void refuse_loose_fragments(const Fragments& fragments, const Body& body,
   }
 }
 
+std::vector<std::uint8_t> lone_elements(const Problem& problem) {
+  std::vector<std::uint8_t> lone(problem.body.element_count(), 1);
+  const std::vector<std::uint8_t> active = active_cells(problem);
+  for (std::size_t c = 0; c < active.size(); ++c)
+    if (active[c])
+      for (const std::uint32_t e : problem.body.cell_elements[c]) lone[e] = 0;
+  return lone;
+}
+
 void carry_strays(const Fragments& fragments, const Problem& problem, const Stencil& stencil, State& state) {
+  std::vector<std::uint8_t> lone(problem.body.element_count());
+  for (std::uint32_t e = 0; e < lone.size(); ++e) lone[e] = stencil.of(e).empty();
+  carry_strays(fragments, problem, lone, state);
+}
+
+void carry_strays(const Fragments& fragments, const Problem& problem, const std::vector<std::uint8_t>& lone,
+                  State& state) {
   const Body& body = problem.body;
   carry_stray_elements(problem, state);
   struct Way {
@@ -245,7 +262,7 @@ void carry_strays(const Fragments& fragments, const Problem& problem, const Sten
       of_fragment[f] = carrier_near(fragments.list[f].part, fragments.list[f].centre);
   const std::vector<std::uint32_t> part = element_parts(body);
   for (std::uint32_t e = 0; e < body.element_count(); ++e) {
-    if (body.parts[part[e]].placement == Placement::centre || !stencil.of(e).empty()) continue;
+    if (body.parts[part[e]].placement == Placement::centre || !lone[e]) continue;
     const std::uint32_t f = fragments.of_element[e];
     const Way carrier = f == kNoFragment ? carrier_near(part[e], body.rest[e]) : of_fragment[f];
     state.displacement[e] = carrier.displacement + carrier.gradient * (body.rest[e] - carrier.centre);

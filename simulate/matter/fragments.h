@@ -46,5 +46,10 @@ void refuse_loose_fragments(const Fragments& fragments, const Body& body,
 // fragment's centre moved, by that cell's mean deformation; stray elements of a centre-placed part as the
 // element nearest to them and its neighbours. `stencil` is that of the cells that were simulated.
 void carry_strays(const Fragments& fragments, const Problem& problem, const Stencil& stencil, State& state);
+// Likewise; `lone`: lone_elements().
+void carry_strays(const Fragments& fragments, const Problem& problem, const std::vector<std::uint8_t>& lone,
+                  State& state);
+// (elements) 1: of no cell that resists.
+[[nodiscard]] std::vector<std::uint8_t> lone_elements(const Problem& problem);
 
 }  // namespace flexel::simulate

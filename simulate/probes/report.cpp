@@ -140,10 +140,9 @@ void refuse_not_finite(const SimulateResult& result, const std::string& scene) {
 
 // A cell resists by its mean deformation gradient; a corner of it may fold unnoticed, and with it the surface
 // that is mapped through it.
-void measure_corners(const Cells& cells, const Body& body, const State& state, SimulateResult& result,
+void measure_corners(const SmallestJacobian& smallest, const Body& body, SimulateResult& result,
                      Progress& progress) {
   constexpr double kNearlyFolded = 0.2;
-  const SmallestJacobian smallest = cells.smallest_corner_jacobian(state);
   if (smallest.cell >= body.cell_count()) return;
   result.smallest_corner_jacobian = smallest.value;
   result.smallest_corner_at = body.rest[body.cell_elements[smallest.cell][smallest.corner]];

@@ -25,7 +25,7 @@ void report_strays(const Fragments& fragments, SimulateResult& result, Progress&
 void measure_displacement(const Body& body, const State& state, SimulateResult& result);
 
 // Smallest J at the corners of the cells, with a warning where one is folded or nearly so.
-void measure_corners(const Cells& cells, const Body& body, const State& state, SimulateResult& result,
+void measure_corners(const SmallestJacobian& smallest, const Body& body, SimulateResult& result,
                      Progress& progress);
 
 // The stresses of the final state: columns of the body, and the largest. Model `paper` has none.

@@ -28,7 +28,7 @@ void TimeSegment::report(const Clock& clock, bool stress, SimulateResult& result
   if (body_.cell_count() > 0) result.smallest_jacobian = cells.smallest_jacobian(state_).value;
   if (paper_)
     result.smallest_jacobian = std::min(result.smallest_jacobian, paper_->smallest_volume(state_).value);
-  measure_corners(cells, body_, state_, result, progress_);
+  measure_corners(cells.smallest_corner_jacobian(state_), body_, result, progress_);
   if (stress) measure_stress(problem_, state_, body_, result);
   measure_displacement(body_, state_, result);
   for (const double mass : lumped_masses(problem_)) result.mass += mass;

@@ -207,6 +207,34 @@ def test_an_error_is_told_once_and_ends_all_ranks():
     expect_only("body.vtu", "scene.toml")
 
 
+def test_what_is_free_is_told_as_by_flexel_simulate():
+    """Rigid motions, asked on the ranks: the same line for each way to hold too little."""
+    need_mpi()
+    body("body.vtu")
+    load = '[[load]]\nwhere = "xmax"\nforce = ["0 N", "0 N", "-1 N"]\n'
+    line = '{ box = { min = ["-1 mm", "-1 mm", "-1 mm"], max = ["1 mm", "11 mm", "1 mm"] } }'
+    for hold in ('where = "xmin"\naxes = "x"', 'where = "xmin"\naxes = "yz"', f"where = {line}"):
+        scene(text=f'material = "steel"\n[[fix]]\n{hold}\n{load}')
+        one, all_ranks = run("flexel-simulate", "scene.toml", "body.vtu", "-o", "out.vtu"), mpi(2, "scene.toml", "body.vtu", "-o", "out.vtu")
+        expect_error(one, "flexel-simulate", "is free to")
+        expect_error(all_ranks, PROGRAM, "is free to")
+        expect(one.err.splitlines()[-1].replace("flexel-simulate:", PROGRAM + ":") == all_ranks.err.splitlines()[-1], f"{hold}: {one.err} and {all_ranks.err}")
+
+
+def test_an_equilibrium_that_is_not_stable_is_told():
+    """A straight column beyond its buckling load, which no load step meets: all ranks ask, whatever their number."""
+    need_mpi()
+    body("body.vtu")
+    for newtons in (1, 3):
+        scene(text=f'material = "rubber"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = ["-{newtons} N", "0 N", "0 N"]\n')
+        command = ("scene.toml", "body.vtu", "-o", "out.vtu", "--force", "--no-estimate", "--no-stress")
+        one = expect_ok(run("flexel-simulate", *command))
+        for ranks in (1, 2, 4):
+            told = expect_ok(mpi(ranks, *command))
+            for result in (one, told):
+                expect(("this equilibrium is not stable" in result.err) == (newtons > 1), f"{newtons} N, {ranks} ranks: {result.err}")
+
+
 def test_more_ranks_than_cells():
     """One cell, which rank 0 solves alone."""
     need_mpi()
