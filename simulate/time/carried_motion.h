@@ -23,6 +23,8 @@ class CarriedMotion {
   // Before the change; `stored` J, in contacts.
   CarriedMotion(const Problem& problem, const State& state, double stored);
 
+  [[nodiscard]] double energy() const { return internal_ + kinetic_; }  // J, before the change
+
   // Afterwards, of the same parts: adds the rigid velocities to `state`. `held` (elements): bits of the
   // axes along which supports lead them; empty: none.
   void give_back(const Problem& problem, const std::vector<std::uint8_t>& held, State& state) const;

@@ -453,12 +453,13 @@ void TimedRun::keep_motion(const CarriedMotion& carried, const Event& event,
                     human_length(off)));
   for (std::size_t p = 0; p < touches.size(); ++p) {
     const Vec3& now = body_.parts[p].lattice.spacing;
-    if (now == before[p].lattice.spacing || !(touches[p].gap < -kPressed * now.minCoeff())) continue;
-    throw InputError(
-        event.origin,
-        fmt::format("resolution: part \"{}\" is pressed by {}, too much for its new lattice: change it "
-                    "before it touches, or after",
-                    before[p].name, human_length(-touches[p].gap)));
+    if (now == before[p].lattice.spacing) continue;
+    if (touches[p].stored > kMostStored * carried.energy() || touches[p].gap < -kPressed * now.minCoeff())
+      throw InputError(
+          event.origin,
+          fmt::format("resolution: part \"{}\" is pressed, and another lattice would press it otherwise: "
+                      "change it before it touches, or after",
+                      before[p].name));
   }
   segment_->put_on_path();
   const Problem problem = timed_problem(body_, scene_, start_);
