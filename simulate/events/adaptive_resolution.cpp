@@ -83,8 +83,8 @@ bool AdaptiveResolution::wants_coarser(PartLevel& of, double jump, double gap, d
          now >= of.changed + least_time_;
 }
 
-// Of the energy that the body has, 1 % of what it would have if the strain of the part differed by as much as it may
-// while it is calm.
+// Of the energy that the body has, 1 % of what it would have if the strain of the part differed by as much as
+// it may while it is calm.
 double AdaptiveResolution::bearable_change(const PartLevel& of) const {
   const double times = settings_.calm * settings_.strain_jump / of.largest;
   return kLargestEnergyChange * times * times;

@@ -374,8 +374,8 @@ bool TimedRun::wants_change() {
   return true;
 }
 
-// From the beginning of an act to its end, or from where a checkpoint has it to there; or to where a part changes its
-// resolution.
+// From the beginning of an act to its end, or from where a checkpoint has it to there; or to where a part
+// changes its resolution.
 void TimedRun::play_until(double end, bool resumed) {
   const auto goes_on = [&] { return *segment_->state().time < end * (1 - kSameTime) && !over(); };
   const bool first = clock_.steps == 0 && goes_on() && !resumed;
@@ -492,8 +492,8 @@ EnergyBalance TimedRun::end_act() {
   return balance;
 }
 
-// These events happen now, and another act begins. Where one of them, or what acts after them, is impossible, the body
-// stays as it was before them.
+// These events happen now, and another act begins. Where one of them, or what acts after them, is impossible,
+// the body stays as it was before them.
 void TimedRun::apply(std::span<const Event> happening) {
   const StopWaits whole;  // between two acts there is no state to save
   EnergyBalance balance = end_act();
