@@ -79,8 +79,8 @@ class Contacts {
   // finish_step(): the pairs are not looked at again.
   [[nodiscard]] bool needs_step_recheck(const State& state);
 
-  // As the hook of simulate/effects/effect.h; not before the first frequency() of explicit steps, which refuses
-  // what overlaps.
+  // As the hook of simulate/effects/effect.h; not before the first frequency() of explicit steps, which
+  // refuses what overlaps.
   void add_touches(const State& state, double ahead, std::vector<PartTouch>& touches);
 
   // Pairs under pressure, as numbers of points (a plane: behind the last point), ascending.

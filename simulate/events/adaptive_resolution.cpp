@@ -23,9 +23,8 @@ namespace {
 
 constexpr double kLeastShare = 0.05;      // of the run, the least time unless the scene gives one
 constexpr double kNear = 0.25, kFar = 1;  // spacings: a gap that makes finer, and one that keeps fine
-// A part is pressed, and stays as it is, beyond this share of the body's energy in its contacts, or so many spacings.
-constexpr double kMostStored = 1e-3, kMostPressed = 0.1;
-constexpr std::size_t kPerPart = 6;  // values of memory()
+constexpr double kMostPressed = 0.1;      // spacings, of a part that changes
+constexpr std::size_t kPerPart = 6;       // values of memory()
 
 // Whether a coarser lattice of the part would have another energy than this one, by more than that share.
 bool would_change_energy(const Problem& problem, const State& state, std::uint32_t part, double internal,
@@ -84,8 +83,8 @@ bool AdaptiveResolution::wants_coarser(PartLevel& of, double jump, double gap, d
          now >= of.changed + least_time_;
 }
 
-// Of the energy that the body has, 1 % of what it would have if the strain of the part differed by as much as it may
-// while it is calm.
+// Of the energy that the body has, 1 % of what it would have if the strain of the part differed by as much as
+// it may while it is calm.
 double AdaptiveResolution::bearable_change(const PartLevel& of) const {
   const double times = settings_.calm * settings_.strain_jump / of.largest;
   return kLargestEnergyChange * times * times;
@@ -141,7 +140,7 @@ bool AdaptiveResolution::look(const Problem& problem, const State& state,
     const bool calm = wants_coarser(of, jumps[of.part], gap, now);
     const bool finer = !why.empty();
     if (!finer && !calm) continue;
-    // Contacts store by the size of their cells, and a finer one bears less depth.
+    // Finer contacts bear less depth.
     if (!energy) energy = internal_and_kinetic(problem, state);
     const auto [internal, kinetic] = *energy;
     if (touch.stored > kMostStored * (internal + kinetic) || touch.gap < -kMostPressed * spacing) continue;

@@ -1,10 +1,10 @@
-// [run] resolution = "adaptive": parts that are strained or touched become finer, and calm ones coarser, by events
-// `resolution` that the run decides on itself. docs/reference/events.md#adaptive-resolution
+// [run] resolution = "adaptive": parts that are strained or touched become finer, and calm ones coarser, by
+// events `resolution` that the run decides on itself. docs/reference/events.md#adaptive-resolution
 //
-// Strain: the largest difference of the strain between neighbouring cells (simulate/matter/strain_jump.h), which a
-// finer lattice halves. Contact: the smallest gap, in spacings of the present lattice. What makes a part coarser is at
-// most half of what makes it finer, by both, and has held for the least time; so a change does not call for the one
-// back.
+// Strain: the largest difference of the strain between neighbouring cells (simulate/matter/strain_jump.h),
+// which a finer lattice halves. Contact: the smallest gap, in spacings of the present lattice. What makes a
+// part coarser is at most half of what makes it finer, by both, and has held for the least time; so a change
+// does not call for the one back.
 #pragma once
 #include <limits>
 #include <string>
@@ -22,8 +22,9 @@ class AdaptiveResolution {
   // `duration` s, of the run. Throws InputError: the body has no part of a name.
   AdaptiveResolution(const AdaptiveSettings& settings, const Body& body, double duration);
 
-  // Whether changes are due in this state, of each part one at most; not at a time that was looked at already, but at
-  // the start. `touches` (parts). A part for which there is no room stays, with a warning, told once.
+  // Whether changes are due in this state, of each part one at most; not at a time that was looked at
+  // already, but at the start. `touches` (parts). A part for which there is no room stays, with a warning,
+  // told once.
   [[nodiscard]] bool look(const Problem& problem, const State& state, const std::vector<PartTouch>& touches,
                           Progress& progress);
   // What is due since, as events.
@@ -31,8 +32,8 @@ class AdaptiveResolution {
   // Share of the energy that these may change without a warning.
   [[nodiscard]] double energy_borne() const { return energy_borne_; }
 
-  // Why a body, which has `now` elements, has no room for that many within --max-elements, memory and the scene's own
-  // limit; empty: it has.
+  // Why a body, which has `now` elements, has no room for that many within --max-elements, memory and the
+  // scene's own limit; empty: it has.
   [[nodiscard]] static std::string beyond_limits(const AdaptiveSettings& settings, double elements,
                                                  double now);
   // The numbers of the parts that it may change, ascending. Throws InputError as above.

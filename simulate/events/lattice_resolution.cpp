@@ -382,7 +382,8 @@ Body at_resolution(const Body& body, const std::vector<std::uint8_t>& changed, R
   return made.finish(body, fields);
 }
 
-// Those that are there, and one in the middle of each edge, face and cell, which are told apart by two opposite corners.
+// Those that are there, and one in the middle of each edge, face and cell, which are told apart by two
+// opposite corners.
 std::size_t finer_element_count(const Body& body, const Part& part) {
   const std::size_t cells = part.cell_end - part.cell_begin;
   std::size_t count = part.element_end - part.element_begin + cells;

@@ -35,8 +35,12 @@ enum class ResolutionChange { finer, coarser };
 // How many elements `part`, of corner placement, would have with cells of half the spacing.
 [[nodiscard]] std::size_t finer_element_count(const Body& body, const Part& part);
 
-// J: elastic, and kinetic but of the motion of all as one; all kinetic. What a change of resolution is judged by.
+// J: elastic, and kinetic but of the motion of all as one; all kinetic. What a change of resolution is judged
+// by.
 [[nodiscard]] std::array<double, 2> internal_and_kinetic(const Problem& problem, const State& state);
+// Share of both, in the contacts of a part, beyond which it cannot change: contacts store by the size of
+// their cells.
+inline constexpr double kMostStored = 1e-3;
 // Share of the first beyond which a warning tells of a change.
 inline constexpr double kLargestEnergyChange = 0.01;
 

@@ -26,8 +26,8 @@ struct CellStrain {
   double within = 0;  // the largest difference between the middles of two opposite faces
 };
 
-// The gradient is F in the middle of a cell and F + G or F - G in those of two opposite faces, for which Green's strain
-// differs by F^T G + G^T F.
+// The gradient is F in the middle of a cell and F + G or F - G in those of two opposite faces, for which
+// Green's strain differs by F^T G + G^T F.
 CellStrain strain_of(const Body& body, const Part& part, const State& state, std::uint32_t cell) {
   const auto sign = [](std::size_t corner, std::size_t axis) { return corner >> axis & 1 ? 1.0 : -1.0; };
   const Vec3 half = part.lattice.spacing / 2;

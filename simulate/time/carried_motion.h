@@ -23,12 +23,14 @@ class CarriedMotion {
   // Before the change; `stored` J, in contacts.
   CarriedMotion(const Problem& problem, const State& state, double stored);
 
+  [[nodiscard]] double energy() const { return internal_ + kinetic_; }  // J, before the change
+
   // Afterwards, of the same parts: adds the rigid velocities to `state`. `held` (elements): bits of the
   // axes along which supports lead them; empty: none.
   void give_back(const Problem& problem, const std::vector<std::uint8_t>& held, State& state) const;
-  // Then: the change of the energy in words, of what is elastic or `stored` in contacts, and of the motion of matter
-  // against its mean; "" where there is none of it. Warns where it is more than `borne`, a share; `origin`: of the event. Throws
-  // DivergedError: a cell is folded.
+  // Then: the change of the energy in words, of what is elastic or `stored` in contacts, and of the motion of
+  // matter against its mean; "" where there is none of it. Warns where it is more than `borne`, a share;
+  // `origin`: of the event. Throws DivergedError: a cell is folded.
   [[nodiscard]] std::string change_of_energy(const Problem& problem, const State& state, double stored,
                                              double borne, const std::string& origin,
                                              Progress& progress) const;

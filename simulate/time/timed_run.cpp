@@ -374,8 +374,8 @@ bool TimedRun::wants_change() {
   return true;
 }
 
-// From the beginning of an act to its end, or from where a checkpoint has it to there; or to where a part changes its
-// resolution.
+// From the beginning of an act to its end, or from where a checkpoint has it to there; or to where a part
+// changes its resolution.
 void TimedRun::play_until(double end, bool resumed) {
   const auto goes_on = [&] { return *segment_->state().time < end * (1 - kSameTime) && !over(); };
   const bool first = clock_.steps == 0 && goes_on() && !resumed;
@@ -453,12 +453,13 @@ void TimedRun::keep_motion(const CarriedMotion& carried, const Event& event,
                     human_length(off)));
   for (std::size_t p = 0; p < touches.size(); ++p) {
     const Vec3& now = body_.parts[p].lattice.spacing;
-    if (now == before[p].lattice.spacing || !(touches[p].gap < -kPressed * now.minCoeff())) continue;
-    throw InputError(
-        event.origin,
-        fmt::format("resolution: part \"{}\" is pressed by {}, too much for its new lattice: change it "
-                    "before it touches, or after",
-                    before[p].name, human_length(-touches[p].gap)));
+    if (now == before[p].lattice.spacing) continue;
+    if (touches[p].stored > kMostStored * carried.energy() || touches[p].gap < -kPressed * now.minCoeff())
+      throw InputError(
+          event.origin,
+          fmt::format("resolution: part \"{}\" is pressed, and another lattice would press it otherwise: "
+                      "change it before it touches, or after",
+                      before[p].name));
   }
   segment_->put_on_path();
   const Problem problem = timed_problem(body_, scene_, start_);
@@ -491,8 +492,8 @@ EnergyBalance TimedRun::end_act() {
   return balance;
 }
 
-// These events happen now, and another act begins. Where one of them, or what acts after them, is impossible, the body
-// stays as it was before them.
+// These events happen now, and another act begins. Where one of them, or what acts after them, is impossible,
+// the body stays as it was before them.
 void TimedRun::apply(std::span<const Event> happening) {
   const StopWaits whole;  // between two acts there is no state to save
   EnergyBalance balance = end_act();

@@ -1,5 +1,5 @@
-// [run] resolution = "adaptive": what is measured, what the policy decides, and runs with it. The swing of a whole program,
-// checkpoints and limits: tests/programs/resolution_test.py.
+// [run] resolution = "adaptive": what is measured, what the policy decides, and runs with it. The swing of a
+// whole program, checkpoints and limits: tests/programs/resolution_test.py.
 #include "simulate/events/adaptive_resolution.h"
 
 #include <fmt/format.h>
@@ -100,7 +100,8 @@ int level_of(const AdaptiveResolution& policy) {
   return static_cast<int>(policy.memory().at(2));
 }
 
-// Whatever bends the bar and comes near it: after a change none back within the least time, and levels within bounds.
+// Whatever bends the bar and comes near it: after a change none back within the least time, and levels within
+// bounds.
 TEST(AdaptiveResolution, DoesNotFlicker) {
   const Body body = box_body(turned_box({6, 2, 2}, 1e-3));
   const Problem problem = problem_of(body, kCauchyGum);

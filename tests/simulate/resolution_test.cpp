@@ -367,6 +367,34 @@ TEST(Resolution, Refuses) {
               ::testing::HasSubstr("2 x 2 x 2"));
 }
 
+// A block that has bounced goes on as it becomes finer; while it is pressed it cannot.
+TEST(Resolution, GoesOnBesideContactAndNotInIt) {
+  const auto landed = [](const char* at) {
+    BoxOptions options;
+    options.cells = {4, 4, 4};
+    options.spacing = Vec3::Constant(5e-3);
+    options.name = "block";
+    Body body = box_body(options);
+    set_velocity(body, std::vector<Vec3>(body.element_count(), Vec3(0, 0, -0.1)));
+    return run_timed(body,
+                     changing_scene(change_at(at, "\"finer\""),
+                                    "[[plane]]\npoint = [\"0 mm\", 0, 0]\nnormal = [0, 0, 1]\n", "6 ms"));
+  };
+  const TimedCase made = landed("4 ms");
+  expect_books_close(made.result);
+  const double kinetic = made.history.column("kinetic")[0];
+  EXPECT_NEAR(made.history.column("kinetic").back() + made.history.column("elastic").back(), kinetic,
+              0.02 * kinetic);
+  EXPECT_GT(made.history.column("momentum z").back(), 0) << "it has bounced";
+  EXPECT_EQ(made.body.cell_count(), 512u);
+  try {
+    (void)landed("0.5 ms");
+    FAIL();
+  } catch (const DivergedError& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("\"block\" is pressed"));
+  }
+}
+
 // A box between two layers of elements holds one more on the finer lattice, which had moved.
 TEST(Resolution, RefusesSupportsThatHoldMoreThanBefore) {
   const char* fix = R"([[fix]]
