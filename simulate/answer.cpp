@@ -101,9 +101,11 @@ std::string turning(const Vec3& moment) {
 
 // The force of a support; its moment about its own middle where that is more than the force has over `size`, m, of the body.
 std::string borne(const Reaction& reaction, double size) {
-  constexpr double kRounding = 1e-3;
+  constexpr double kRounding = 1e-3,
+                   kNothing = 1e-15;  // N: what is free to expand bears nothing, but for rounding
   const Vec3 moment = reaction.moment_about_middle();
   const double lever = size * reaction.force.norm();
+  if (std::max(lever, moment.norm()) < kNothing * size) return "no force";
   if (!(moment.norm() > lever)) return directed(reaction.force);
   return turning(moment) + (lever > kRounding * moment.norm() ? " and " + directed(reaction.force) : "");
 }

@@ -111,6 +111,8 @@ TEST(Answer, WithoutABarNothingIsPromised) {
 TEST(Answer, AMomentIsNamedWhereTheForceSaysLittle) {
   Case made = with_bar(0.03);
   EXPECT_THAT(made.text(), HasSubstr("held by    \"xmin\" with 5 N along +z\n"));
+  made.result.reactions[0] = {"xmin", Vec3(0, 3.6e-21, 0), Vec3::Zero()};
+  EXPECT_THAT(made.text(), HasSubstr("held by    \"xmin\" with no force\n"));
   simulate::Reaction& reaction = made.result.reactions[0];
   reaction.middle = Vec3(0.5, 0.2, 0);
   reaction.force = Vec3(0.6, 0, 0);
