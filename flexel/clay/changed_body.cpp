@@ -53,7 +53,7 @@ std::string surface_pack(const NumberedBody& body) {
     throw InputError(fmt::format("carve: what is left cannot be closed ({})", error.what()));
   }
   for (std::uint32_t& carrier : file.surface->carriers) carrier = (*body.element)[carrier];
-  const Bytes bytes = view::pack_file(file);
+  const Bytes bytes = view::pack_file(file, true);
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 

@@ -72,7 +72,7 @@ void ArrayPack::add_bytes(const std::string& name, std::span<const std::uint8_t>
 
 void ArrayPack::add(const std::string& name, const std::string& description, std::size_t count, int width,
                     std::span<const std::byte> planes) {
-  const Bytes packed = compress(planes);
+  const Bytes packed = compress(planes, level_);
   arrays_ +=
       fmt::format(R"({}{}:{{{},"count":{},"width":{},"offset":{},"bytes":{}}})", arrays_.empty() ? "" : ",",
                   json_text(name), description, count, width, data_.size(), packed.size());

@@ -12,8 +12,12 @@
 
 namespace flexel::view {
 
+constexpr int kUsualLevel = 6, kQuickLevel = 1;  // of zlib: the second in a third of the time, and larger
+
 class ArrayPack {
  public:
+  explicit ArrayPack(int level = kUsualLevel) : level_(level) {}
+
   // (n x 3) Each coordinate is rounded to a step of a 65,535th of the greatest extent of the box around them, so it is wrong by
   // half of that at most. Finite. Kind "points": 16 bits, the difference from the one before, modulo 2^16.
   void add_points(const std::string& name, std::span<const Vec3> points);
@@ -32,6 +36,7 @@ class ArrayPack {
  private:
   void add(const std::string& name, const std::string& description, std::size_t count, int width,
            std::span<const std::byte> planes);
+  int level_;
   std::string arrays_;  // members of a JSON object
   Bytes data_;
 };

@@ -215,8 +215,8 @@ std::string html_of(const Json& page, const std::string& data, bool whole) {
 
 }  // namespace
 
-Bytes pack_file(const ViewFile& file) {
-  ArrayPack pack;
+Bytes pack_file(const ViewFile& file, bool quick) {
+  ArrayPack pack(quick ? kQuickLevel : kUsualLevel);
   Json about = {{"label", printable(file.label)}};
   about["parts"] = Json::array();
   for (const std::string& part : file.parts) about["parts"].push_back(name_json(part));

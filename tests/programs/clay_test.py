@@ -354,6 +354,17 @@ def test_carving_along_stops_where_nothing_would_hold_the_part():
         expect(gone(after) == gone(some) and "is not held" in after["said"], f"the rest of the way is passed over, and it still says why: {after['said']!r}")
         expect_same_run(url, after, ("--crack", "cap"))
         expect(same(hand.act("undo")["positions"], whole["positions"]), "one act")
+        # a way has an end, and so has one amid which something else is done
+        hand.post("carve from 0.04 0.02 0.006 0.009")
+        for _ in range(21):
+            expect(hand.post(*(100 * ["carve to 0.045 0.02 0.006"]))[0] == 200, "places of a way wait together")
+        expect("2,000 places" in hand.act("stay")["said"], f"{hand.last['said']}")
+        while hand.act("undo")["surface"] != 0:
+            pass
+        frame = hand.act("carve from 0.04 0.02 0.006 0.009", "keep", "carve to 0.05 0.02 0.006")
+        expect(frame["kept"] == 1 and "put the ball down first" in frame["said"], f"{frame['kept']} {frame['said']}")
+        hand.act("undo", "undo")
+        expect(same(hand.last["positions"], whole["positions"]), "undone")
         # another client that takes the tool does not carve on
         hand.act("carve from 0.04 0.02 0.006 0.009")
         other = Hand(url, 16 * "b")
