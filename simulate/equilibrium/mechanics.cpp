@@ -193,8 +193,8 @@ void Mechanics::eliminate_prescribed() {
 }
 
 bool Mechanics::renew_effects(const State& state) {
-  if (!made_ || follows()) return false;
-  BlockMatrix& added = made_->added();
+  if (!lattice().made || follows()) return false;
+  BlockMatrix& added = lattice().made->added();
   std::fill(added.values.begin(), added.values.end(), Block::Zero());
   for (const ActiveEffect& effect : effects_) effect->add_stiffness(state, added);
   return true;
