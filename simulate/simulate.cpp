@@ -468,8 +468,9 @@ SimulateResult simulate(Body& body, const Scene& scene, const SimulateOptions& o
     Joints::refuse_fused(first.get<Joints>(), body);
   }
   refuse_heat(scene);
-  refuse_beyond_memory(body, scene);
-  if (options.explain) explain_memory(body, scene, progress);
+  const bool alone = !options.hooks;  // others' memory is not known here
+  if (alone) refuse_beyond_memory(body, scene);
+  if (alone && options.explain) explain_memory(body, scene, progress);
   if (scene.get<Thermal>().conducts()) conduct(body, scene, progress);
   if (asks_for_modes(scene)) {
     SimulateResult result = run_modes(body, scene, options, progress);

@@ -3,8 +3,8 @@
 
     PATH=build/release/bin:$PATH bench/scale/scale.py [--large] >docs/measurements/scale.md
 
-The case is a bar of steel, 4:1:1, held at one end with a small load across the other. --large adds 300,000 and a million cells. Wall seconds
-mean something on a quiet machine only; iterations, bytes and memory mean the same on any.
+The case is a bar of steel, 4:1:1, held at one end with a small load across the other. --large adds a million cells. Wall seconds mean something on
+a quiet machine only; iterations, bytes and memory mean the same on any.
 """
 
 import argparse
@@ -68,6 +68,7 @@ def solve(folder, body, ranks):
     linear = re.search(r"linear solver\D*([\d.]+) s", said)
     found.update(wall=wall, processor=processor, linear=float(linear[1]) if linear else float("nan"), ranks=ranks,
                  memory=[bytes_of(each) for each in re.findall(r"rank \d+: [\d,]+ cells, ([\d.,]+ \w+) at most", said)])
+    found["rank_cells"] = [int(each.replace(",", "")) for each in re.findall(r"rank \d+: ([\d,]+) cells", said)]
     found["tip"] = sum(x * x for x in found["probes"][0]["displacement"]) ** 0.5
     if ranks:
         found["events"], found["ksp"] = events(log.read_text()), event_seconds(log.read_text(), "KSPSolve")
@@ -166,12 +167,12 @@ def message_table(results):
 
 
 def memory_fit(results):
-    """Bytes a cell: of rank 0's own share (whole body), and of a rank's piece; by least squares over runs with two ranks or more."""
-    rows = [(found["cells"], found["cells"] / found["ranks"], found["memory"]) for _, found in results if found["ranks"] > 1]
-    biggest, smallest = max(rows, key=lambda each: each[1]), min(rows, key=lambda each: each[1])
-    piece = (max(biggest[2][1:]) - max(smallest[2][1:])) / (biggest[1] - smallest[1])
-    base = max(smallest[2][1:]) - piece * smallest[1]
-    whole = max(biggest[2][0] - base - piece * biggest[1], 0) / biggest[0]
+    """Bytes a cell: of a rank's piece, and of the whole body on rank 0; and a rank's base: from the largest and the smallest piece."""
+    rows = [(found["cells"], found["rank_cells"], found["memory"]) for _, found in results if found["ranks"] > 1]
+    biggest, smallest = max(rows, key=lambda each: each[1][1]), min(rows, key=lambda each: each[1][1])
+    piece = (max(biggest[2][1:]) - max(smallest[2][1:])) / (biggest[1][1] - smallest[1][1])
+    base = max(smallest[2][1:]) - piece * smallest[1][1]
+    whole = max(biggest[2][0] - base - piece * biggest[1][0], 0) / biggest[0]
     return piece, whole, base
 
 
@@ -232,6 +233,7 @@ def event_seconds(log, name):
 def main():
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("--large", action="store_true", help="a million cells too")
+    arguments.add_argument("--last", action="store_true", help="only the sections after Memory")
     arguments.add_argument("--ex56", type=pathlib.Path, help="source of PETSc's example ksp/tutorials/ex56.c (Debian's libpetsc3.18-dev-examples has it)")
     options = arguments.parse_args()
     with tempfile.TemporaryDirectory() as place:
@@ -241,8 +243,10 @@ def main():
 Printed by `bench/scale/scale.py{' --large' if options.large else ''}` on {os.cpu_count()} cores ({processor_name()}), load average {os.getloadavg()[0]:.1f} when it began. A bar of steel, 4:1:1, held at one end, with a small
 load across the other; `flexel-simulate-mpi` without error bars and stresses. Wall and linear seconds are those of a machine with that load; more ranks than cores
 share them.""")
-        hierarchy_table(folder, [(56, 14, 14), (116, 29, 29)] + ([(252, 63, 63)] if options.large else []))
-        large = memory_table(folder, [(116, 29, 29)] + ([(168, 42, 42)] if options.large else []))
+        large = []
+        if not options.last:
+            hierarchy_table(folder, [(56, 14, 14), (116, 29, 29)] + ([(252, 63, 63)] if options.large else []))
+            large = memory_table(folder, [(56, 14, 14), (116, 29, 29), (168, 42, 42)])
         results = scaling_table(folder, "Strong scaling", "The same body on more ranks.", [((88, 22, 22), ranks) for ranks in (1, 2, 4)])
         results += scaling_table(folder, "Weak scaling", "As many cells for each rank: the bar grows along its length.",
                                  [((40 * ranks, 16, 16), ranks) for ranks in (1, 2, 4)])

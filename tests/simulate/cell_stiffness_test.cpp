@@ -8,8 +8,10 @@
 #include <ostream>
 #include <random>
 
+#include "base/error.h"
 #include "base/parallel.h"
 #include "formats/lattice/merge.h"
+#include "simulate/equilibrium/equilibrium.h"
 #include "simulate/equilibrium/mechanics.h"
 #include "simulate/scene/effects.h"
 #include "simulate/scene/scene.h"
@@ -26,8 +28,8 @@ using testing::box_body;
 using testing::BoxOptions;
 using testing::kGumYoung;
 
-// Two parts that touch, turned in space, with slivers and a hole, spacings that differ.
-Body two_boxes() {
+// A part turned in space, with slivers and a hole, spacings that differ.
+BoxOptions near_box() {
   const auto [along, wide, high] =
       less_if_sanitized(std::array{19, 7, 6}, std::array{9, 4, 3}, "a sixth of the cells");
   BoxOptions near;
@@ -39,10 +41,20 @@ Body two_boxes() {
   near.fill = [](int i, int j, int k) {
     return i == 4 && j == 3 ? 0 : 0.05 + 0.9 * ((i + 2 * j + 3 * k) % 7) / 7;
   };
+  return near;
+}
+
+Body one_box() {
+  return box_body(near_box());
+}
+
+// Two that touch.
+Body two_boxes() {
+  const BoxOptions near = near_box();
   BoxOptions far = near;
   far.name = "far";
-  far.cells = {5, wide, high};
-  far.origin = near.axes * Vec3(along * 0.1, 0, 0);
+  far.cells[0] = 5;
+  far.origin = near.axes * Vec3(near.cells[0] * 0.1, 0, 0);
   far.fill = {};
   Body body = box_body(near);
   append(body, box_body(far));
@@ -189,6 +201,103 @@ TEST(CellStiffness, CellsBesideGapsAreNoRun) {
   multiply(made.tangent(), x, found);
   for (std::size_t e = 0; e < expected.size(); ++e)
     ASSERT_LT((expected[e] - found[e]).norm(), 1e-9 * kGumYoung * 0.1) << e;
+}
+
+// Stands for other processes, by mechanics of its own.
+class OtherProcesses : public CellsElsewhere {
+ public:
+  explicit OtherProcesses(Mechanics& other) : other_(other) {}
+  [[nodiscard]] Figures figures(const State& state) override {
+    return {other_.elastic_energy(state), other_.cells().smallest_jacobian(state),
+            other_.smallest_corner_jacobian(state)};
+  }
+  void add_forces(const State& state, std::vector<Vec3>& forces) override {
+    other_.add_elastic_forces(state, forces);
+  }
+  [[nodiscard]] std::optional<bool> has_positive_tangent(const State&) override { return std::nullopt; }
+  void multiply(const std::vector<Vec3>& x, std::vector<Vec3>& y) override {
+    assemble();
+    simulate::multiply(other_.tangent(), x, y);
+  }
+  [[nodiscard]] std::vector<Vec3> diagonal() override {
+    assemble();
+    std::vector<Vec3> diagonal;
+    for (const Block& block : other_.tangent().diagonal()) diagonal.emplace_back(block.diagonal());
+    return diagonal;
+  }
+
+ private:
+  void assemble() {
+    other_.assemble({std::vector<Vec3>(other_.body().element_count(), Vec3::Zero()), 1});
+    other_.eliminate_prescribed();
+  }
+  Mechanics& other_;
+};
+
+TEST(CellsElsewhere, DoWhatIsDoneHere) {
+  const Body body = one_box();
+  const Scene scene = held_scene();
+  const Problem problem{body, materials_of_parts(scene, body), {}, {}, {}, {}};
+  Mechanics here(problem, active_effects(scene.effects, problem)),
+      there(problem, active_effects(scene.effects, problem)),
+      moved(problem, active_effects(scene.effects, problem));
+  moved.move_cells(std::make_shared<OtherProcesses>(there));
+  const State state{random_vectors(body.element_count(), 1e-3), 1};
+  EXPECT_EQ(moved.elastic_energy(state), here.elastic_energy(state));
+  EXPECT_EQ(moved.most_compressed(state).name, here.most_compressed(state).name);
+  EXPECT_LT(moved.most_compressed(state).value, 1);
+  EXPECT_EQ(moved.smallest_corner_jacobian(state).value, here.smallest_corner_jacobian(state).value);
+  EXPECT_EQ(moved.forces(state).total, here.forces(state).total);
+  const std::vector<std::uint8_t> tied = moved.tied_elements();
+  EXPECT_EQ(tied, here.tied_elements());
+  EXPECT_NE(std::count(tied.begin(), tied.end(), 2), 0);
+  moved.move_cells(nullptr);  // made again
+  EXPECT_EQ(moved.elastic_energy(state), here.elastic_energy(state));
+}
+
+// Of a box that is held along two axes, or by elements at one point.
+TEST(CellsElsewhere, TellWhatIsFreeAsIsToldHere) {
+  const Body body = one_box();
+  Scene scene = held_scene();
+  const Tie ball = scene.get<Supports>().ties.back();
+  for (const Tie& tie : {make_fix(select_by_name("near/x0")), ball}) {
+    scene.get<Supports>().ties = {tie};
+    scene.get<Supports>().ties.front().axes = {true, false, true};
+    const Problem problem{body, materials_of_parts(scene, body), {}, {}, {}, {}};
+    Mechanics here(problem, active_effects(scene.effects, problem)),
+        there(problem, active_effects(scene.effects, problem)),
+        moved(problem, active_effects(scene.effects, problem));
+    moved.move_cells(std::make_shared<OtherProcesses>(there));
+    const State rest{std::vector<Vec3>(body.element_count(), Vec3::Zero()), 1};
+    const auto told = [&](Mechanics& mechanics) -> std::string {
+      try {
+        refuse_free_motions(mechanics, rest, "scene.toml");
+      } catch (const InputError& error) {
+        return error.what();
+      }
+      return "nothing is free";
+    };
+    EXPECT_EQ(told(moved), told(here));
+    EXPECT_NE(told(here).find("is free to translate along"), std::string::npos) << told(here);
+  }
+}
+
+TEST(Mechanics, StiffnessOfEffectsIsTheSlopeOfTheirForces) {
+  const Body body = one_box();
+  const Scene scene = held_scene();
+  const Problem problem{body, materials_of_parts(scene, body), {}, {}, {}, {}};
+  Mechanics mechanics(problem, active_effects(scene.effects, problem));
+  const State rest{std::vector<Vec3>(body.element_count(), Vec3::Zero()), 1},
+      moved{random_vectors(body.element_count(), 1), 1};
+  const std::vector<Vec3> before = mechanics.forces_of_effects(rest),
+                          after = mechanics.forces_of_effects(moved);
+  std::vector<Vec3> pulled(body.element_count());
+  multiply(mechanics.stiffness_of_effects(rest), moved.displacement, pulled);
+  double largest = 0;
+  for (const Vec3& each : pulled) largest = std::max(largest, each.norm());
+  EXPECT_GT(largest, 0);
+  for (std::size_t e = 0; e < pulled.size(); ++e)
+    ASSERT_LT((after[e] - before[e] + pulled[e]).norm(), 1e-12 * largest) << e;
 }
 
 }  // namespace
