@@ -25,7 +25,6 @@ using testing::Csv;
 using testing::expect_books_close;
 using testing::expect_momenta_kept;
 using testing::kCauchyGum;
-using testing::problem_of;
 using testing::run_timed;
 using testing::TimedCase;
 
@@ -104,7 +103,7 @@ int level_of(const AdaptiveResolution& policy) {
 // bounds.
 TEST(AdaptiveResolution, DoesNotFlicker) {
   const Body body = box_body(turned_box({6, 2, 2}, 1e-3));
-  const Problem problem = problem_of(body, kCauchyGum);
+  const Problem problem = testing::problem_of(body, kCauchyGum);
   Progress quiet("test", Progress::Mode::quiet);
   std::mt19937 random(7);
   std::uniform_real_distribution<double> any(0, 1);
@@ -147,7 +146,7 @@ TEST(AdaptiveResolution, DoesNotFlicker) {
 // A checkpoint's memory gives the same decisions.
 TEST(AdaptiveResolution, GoesOnFromItsMemory) {
   const Body body = box_body(turned_box({6, 2, 2}, 1e-3));
-  const Problem problem = problem_of(body, kCauchyGum);
+  const Problem problem = testing::problem_of(body, kCauchyGum);
   Progress quiet("test", Progress::Mode::quiet);
   AdaptiveSettings settings;
   settings.coarsest = 1;
@@ -172,7 +171,7 @@ TEST(AdaptiveResolution, GoesOnFromItsMemory) {
 // What is pressed stays: its contacts would store another energy.
 TEST(AdaptiveResolution, APressedPartStays) {
   const Body body = box_body(turned_box({6, 2, 2}, 1e-3));
-  const Problem problem = problem_of(body, kCauchyGum);
+  const Problem problem = testing::problem_of(body, kCauchyGum);
   Progress quiet("test", Progress::Mode::quiet);
   AdaptiveResolution policy({}, body, 1);
   State state = bent(body, 5);
