@@ -1,4 +1,4 @@
-// WriteArray of elements that several ranks have are the same on all of these: they are summed up where they are owned, and handed out again.
+// Values of elements that several ranks have are the same on all of these: they are summed up where they are owned, and handed out again.
 #include "distributed/hierarchy.h"
 
 #include <algorithm>

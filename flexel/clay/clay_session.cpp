@@ -436,16 +436,17 @@ void ClaySession::draw(const Act& act) {
   }
   Carving& carving = *stroke_.carving;
   if (carving.refused) return;
-  if (act.on) {
+  const std::size_t count = std::min(act.way.size(), kMostPlaces - carving.places);
+  if (act.on && count > 0) {
     carving.ways.push_back({{}, act.radius});
     carving.holds.push_back(0);
   }
   std::vector<Vec3>& path = carving.ways.back().path;
-  path.insert(path.end(), act.way.begin(), act.way.end());
-  carving.places += act.way.size();
-  if (carving.places > kMostPlaces)
-    throw InputError("the way has 2,000 places: lift the tool before it goes on");
-  if (!draws_on()) carve_drawn();
+  path.insert(path.end(), act.way.begin(), act.way.begin() + static_cast<std::ptrdiff_t>(count));
+  carving.places += count;
+  const bool ends = count < act.way.size();
+  if (ends || !draws_on()) carve_drawn();
+  if (ends) throw InputError("the way has 2,000 places: lift the tool before it goes on");
 }
 
 // What goes is what the whole way sweeps, as in the scene, however it came in pieces.

@@ -299,12 +299,22 @@ NewtonOutcome newton_with_links(Mechanics& mechanics, State& state, const Newton
   return Balance(mechanics, state, options, progress).run();
 }
 
-bool links_are_stable(Mechanics& mechanics, State state, const Preconditioner& preconditioner) {
+std::optional<bool> links_are_stable(Mechanics& mechanics, State state,
+                                     const Preconditioner& preconditioner) {
   const std::vector<std::shared_ptr<RigidLink>> links = rigid_links(mechanics.constraints());
   if (links.empty()) return true;
+  if (mechanics.follows()) return std::nullopt;
+  struct Stopped {};
+  const auto ask = [](double, const std::string&) {
+    check_stop();
+    if (stop_is_due()) throw Stopped();
+  };
   const std::vector<RigidLink> before = copies(links);
-  const bool stable =
-      Balance(mechanics, state, {}, [](double, const std::string&) { check_stop(); }).stable(preconditioner);
+  std::optional<bool> stable;
+  try {
+    stable = Balance(mechanics, state, {}, ask).stable(preconditioner);
+  } catch (const Stopped&) {
+  }
   restore(links, before);
   return stable;
 }

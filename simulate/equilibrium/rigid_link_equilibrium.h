@@ -1,5 +1,7 @@
 // Equilibrium of a body with rigid links (simulate/conditions/rigid_link.h).
 #pragma once
+#include <optional>
+
 #include "simulate/equilibrium/newton.h"
 
 namespace flexel::simulate {
@@ -14,7 +16,9 @@ namespace flexel::simulate {
 
 // Whether motions of the rigid links, the elements following, raise the energy at an equilibrium, whose positive tangent
 // Mechanics::tangent() holds, eliminated. A moment that keeps its direction has no energy: the symmetric part of its
-// stiffness counts. True without links.
-[[nodiscard]] bool links_are_stable(Mechanics& mechanics, State state, const Preconditioner& preconditioner);
+// stiffness counts. True without links. Nothing: the run is to stop, under a StopWaits too, or a load that follows acts beside
+// links, which the tangent does not have.
+[[nodiscard]] std::optional<bool> links_are_stable(Mechanics& mechanics, State state,
+                                                   const Preconditioner& preconditioner);
 
 }  // namespace flexel::simulate

@@ -359,6 +359,8 @@ def test_carving_along_stops_where_nothing_would_hold_the_part():
         for _ in range(21):
             expect(hand.post(*(100 * ["carve to 0.045 0.02 0.006"]))[0] == 200, "places of a way wait together")
         expect("2,000 places" in hand.act("stay")["said"], f"{hand.last['said']}")
+        places = saved(url, "scene.toml").count(b",\n    [") + 1
+        expect(places == 2000, f"what fits is carved, however it came: {places} places")
         while hand.act("undo")["surface"] != 0:
             pass
         frame = hand.act("carve from 0.04 0.02 0.006 0.009", "keep", "carve to 0.05 0.02 0.006")
