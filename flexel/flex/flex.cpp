@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 #include <optional>
 
@@ -97,7 +98,7 @@ double turn_between(const Mat3& one, const Mat3& other, const FlexFrame& frame) 
   return between.angle() * between.axis().dot(frame.axis);
 }
 
-// rad, whole turns included: summed up over slices of the matter from the held end to the other.
+// rad, summed up over slices of the matter from the held end to the other: near enough to count whole turns.
 double turn_along(const Mat3& held, const Mat3& led, const FlexFrame& frame, const Body& body) {
   constexpr double kSlice = 1.5;  // spacings
   constexpr std::size_t kMostSlices = 200;
@@ -216,7 +217,8 @@ double measure_flex(const Flex& flex, const Body& body, const std::vector<Vec3>&
   const FlexFrame frame = flex_frame(flex, body.surface);
   const Mat3 held = turn_of_side(body, resolve(side(frame.held, flex), body), displacement);
   const Mat3 led = turn_of_side(body, resolve(side(frame.led, flex), body), displacement);
-  return turn_along(held, led, frame, body);
+  const double between = turn_between(held, led, frame), whole = 2 * std::numbers::pi;
+  return between + whole * std::round((turn_along(held, led, frame, body) - between) / whole);
 }
 
 bool flex_failed(const Flex& flex, const FlexAnswer& answer) {

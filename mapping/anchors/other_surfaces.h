@@ -27,7 +27,7 @@ struct PointTable {
 [[nodiscard]] std::string moved_points(const PointTable& table, const std::vector<Vec3>& displacement,
                                        double unit);
 // Puts the points in the place of the body's surface, as vertices that no polygon uses: each goes with the
-// part whose matter it is in, or nearest to.
+// part in whose cells it is, or nearest to; of several the one with the nearest element.
 void map_points(Body& body, const std::vector<Vec3>& points);
 
 }  // namespace flexel::mapping

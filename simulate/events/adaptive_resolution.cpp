@@ -143,7 +143,8 @@ bool AdaptiveResolution::look(const Problem& problem, const State& state,
     // Finer contacts bear less depth.
     if (!energy) energy = internal_and_kinetic(problem, state);
     const auto [internal, kinetic] = *energy;
-    if (touch.stored > kMostStored * (internal + kinetic) || touch.gap < -kMostPressed * spacing) continue;
+    const double narrowest = body.parts[of.part].lattice.spacing.minCoeff();  // as the event has it
+    if (touch.stored > kMostStored * (internal + kinetic) || touch.gap < -kMostPressed * narrowest) continue;
     if (calm && would_change_energy(problem, state, of.part, internal, kinetic, bearable_change(of))) {
       of.calm_since = now;  // it is not
       of.largest = 0;

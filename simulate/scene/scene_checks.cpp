@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "base/error.h"
 #include "base/human.h"
@@ -176,15 +177,21 @@ std::uint8_t axes_at_odds(const Tie& one, const Tie& other) {
   return static_cast<std::uint8_t>(both & odds);
 }
 
-// A surface that is held or led, on elements that are led elsewhere: neither gets its way. (What is led and held by the same
-// kind of selection is refused where ties are made.)
-void check_at_odds(const Tie& surface, const Tie& elements, const Body& body, Progress& progress) {
-  const std::uint8_t odds = axes_at_odds(surface, elements);
-  if (odds == 0 || surface.link || elements.link) return;
-  const HeldMasks held = held_masks({elements}, body);
-  if (!held.elements) return;
+// What a tie holds or leads, and where.
+struct TiedPlace {
+  const Tie& tie;
+  const Selected& place;
+};
+
+// A surface that is held or led, on elements that are led elsewhere along axes `odds`: neither gets its way.
+// (What is led and held by the same kind of selection is refused where ties are made.)
+void check_at_odds(const TiedPlace& of_surface, const TiedPlace& of_elements, std::uint8_t odds,
+                   const Body& body, Progress& progress) {
+  const Tie &surface = of_surface.tie, &elements = of_elements.tie;
+  HeldMasks held{{}, std::vector<std::uint8_t>(body.element_count(), 0), true};
+  for (const std::uint32_t e : of_elements.place.elements) held.element[e] = axes_of(elements);
   double both = 0, whole = 0;
-  for (const std::uint32_t p : resolve(surface.where, body).polygons)
+  for (const std::uint32_t p : of_surface.place.polygons)
     for_each_patch(body, p, [&](const Vec3& middle, double area) {
       if ((held_under(held, body, p, middle) & odds) != 0) both += area;
       whole += area;
@@ -199,6 +206,22 @@ void check_at_odds(const Tie& surface, const Tie& elements, const Body& body, Pr
   if (both > kPartlyHeld * whole) throw InputError(surface.origin, what + "; " + advice);
   progress.warn(fmt::format("{}: {}, and neither gets its way there, at forces that mean nothing; {}",
                             surface.origin, what, advice));
+}
+
+// Each with each other one; what a tie selects is looked for once, and only where another is at odds with it.
+void check_ties(const std::vector<Tie>& ties, const Body& body, Progress& progress) {
+  std::vector<std::optional<Selected>> found(ties.size());
+  const auto place = [&](std::size_t n) -> const Selected& {
+    if (!found[n]) found[n] = resolve(ties[n].where, body);
+    return *found[n];
+  };
+  for (std::size_t s = 0; s < ties.size(); ++s)
+    for (std::size_t e = 0; e < ties.size(); ++e) {
+      const std::uint8_t odds = axes_at_odds(ties[s], ties[e]);
+      if (odds == 0 || ties[s].link || ties[e].link) continue;
+      if (place(s).polygons.empty() || place(e).elements.empty()) continue;
+      check_at_odds({ties[s], place(s)}, {ties[e], place(e)}, odds, body, progress);
+    }
 }
 
 // Degrees between the mean normal of a side's polygons and its axis.
@@ -225,8 +248,7 @@ void check_actions(const Scene& scene, const Body& body, Progress& progress) {
   warn_of_unused_materials(scene, body, progress);
   if (!scene.run.time) refuse_courses(scene);
   const std::vector<Tie>& ties = scene.get<Supports>().ties;
-  for (const Tie& surface : ties)
-    for (const Tie& elements : ties) check_at_odds(surface, elements, body, progress);
+  check_ties(ties, body, progress);
   if (scene.get<Loads>().loads.empty()) return;
   const HeldMasks held = held_masks(ties, body);
   for (const Load& load : scene.get<Loads>().loads) {

@@ -108,7 +108,8 @@ void rehearse_levels(const Body& body, const Scene& scene, ResolutionChange to, 
       any = true;
     }
     if (!any && level == 0)
-      throw InputError(settings.origin, no_room + "; voxelize with a larger --size, or set \"finest\" to 0");
+      throw InputError(settings.origin,
+                       no_room + "; allow more, voxelize with a larger --size, or leave \"resolution\" out");
     if (!any) return;
     look_for_what_it_names(rehearsal.body(), scene, settings.origin);
   }

@@ -451,7 +451,8 @@ void TimedRun::keep_motion(const CarriedMotion& carried, const Event& event,
         fmt::format("resolution: on the new lattice a [[fix]] or [[move]] holds elements that were free "
                     "and are {} off: let it name a face, or a box that ends at elements of both lattices",
                     human_length(off)));
-  for (std::size_t p = 0; p < touches.size(); ++p) {
+  // A run that adapts has looked at this state, with velocities of half a step before.
+  for (std::size_t p = 0; !adaptive_ && p < touches.size(); ++p) {
     const Vec3& now = body_.parts[p].lattice.spacing;
     if (now == before[p].lattice.spacing) continue;
     if (touches[p].stored > kMostStored * carried.energy() || touches[p].gap < -kPressed * now.minCoeff())

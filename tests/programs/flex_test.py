@@ -105,6 +105,16 @@ def test_whole_turns_are_measured():
     expect(abs(told() - 200) < 5, told())
 
 
+def test_the_angle_is_that_of_the_ends():
+    """The matter between them only counts whole turns: over two cells across it turns by a fifth less from slice to slice."""
+    pathlib.Path("bar.stl").write_bytes(ascii_stl(box_triangles((60.0, 10.0, 10.0))))
+    for angle, within in ((720, 20), (-400, 10)):
+        expect_ok(run("flexel", "flex", "bar.stl", "--twist", f"{angle} deg", "--along", "x", "--material", "rubber", "--size", "5mm",
+                      "--no-estimate", "--summary", "s.json", "-o", "twisted.stl", "--force"))
+        found = math.degrees(json.loads(pathlib.Path("s.json").read_text())["flex"]["angle"])
+        expect(abs(found - angle) < within, f"{angle} degrees asked for: {found}")
+
+
 def test_what_cannot_be_is_one_line():
     part()
     flex = lambda *words: run("flexel", "flex", "bar.stl", *words, "--material", "PLA", "--size", "2mm", "-o", "bent.stl")

@@ -165,6 +165,20 @@ def test_a_resumed_run_adapts_with_the_same_bytes():
     expect(told.count("elements became") >= 4, told)
 
 
+def test_a_plate_that_is_hardly_pressed_changes():
+    """A thousandth of the energy is in its contacts, by velocities of half a step before a little less, by those of the change a little more."""
+    write("plate.stl", binary_stl(box_triangles((21, 21, 4.6))))
+    expect_ok(run("flexel-voxelize", "plate.stl", "--size", "3 mm", "-o", "plate.vtu"))
+    gum = GUM.split("[[fix]]")[0].replace("5 MPa", "1 MPa") + '[[plane]]\npoint = ["0 mm", "0 mm", "-1 mm"]\nnormal = [0, 0, 1]\n'
+    speeds = [4.733611102366905 + 0.002 * n for n in range(-5, 6)]
+    for speed in speeds:
+        write("scene.toml", gum + f'[[velocity]]\nwhere = "plate"\nvelocity = ["0 m/s", "0 m/s", "-{speed} m/s"]\n'
+              'spin = { axis = [0, 1, 0], through = ["10 mm", "10 mm", "2 mm"], angle_per_second = "3000 deg" }\n'
+              '[run]\ntime = "1 ms"\nresolution = "adaptive"\n[adaptive]\nleast_time = "1 ms"\nstrain_jump = 0.05\ncontact = false\n')
+        told = expect_ok(run("flexel-simulate", "scene.toml", "plate.vtu", "-o", "out.vtu", "--force")).err
+        expect("192 elements became 1125" in told, told)
+
+
 def test_a_resumed_run_that_meets_a_floor_has_the_same_bytes():
     """It becomes finer before it touches, bounces, and is as it was at the end; explicit steps, and implicit ones."""
     bent_bar("5 mm")

@@ -185,6 +185,20 @@ TEST(AdaptiveResolution, APressedPartStays) {
   EXPECT_TRUE(policy.look(problem, state, touches, quiet));
 }
 
+// By its narrowest spacing, as events refuse it: else the run would end where it could wait.
+TEST(AdaptiveResolution, APressedPartOfLongCellsStays) {
+  BoxOptions options = turned_box({6, 2, 2}, 1e-3);
+  options.spacing = Vec3(3e-3, 1e-3, 1e-3);
+  const Body body = box_body(options);
+  const Problem problem = problem_of(body, kCauchyGum);
+  Progress quiet("test", Progress::Mode::quiet);
+  AdaptiveResolution policy({}, body, 1);
+  State state = bent(body, 5);
+  EXPECT_FALSE(policy.look(problem, state, {{-1.1e-4, -1.1e-4, 1e-12}}, quiet));
+  state.time = 0.1;
+  EXPECT_TRUE(policy.look(problem, state, {{-0.9e-4, -0.9e-4, 1e-12}}, quiet));
+}
+
 Scene adaptive_scene(const std::string& adaptive, const std::string& more, const std::string& run) {
   return parse_scene(
       fmt::format("material = \"gum\"\n[materials.gum]\nyoung = \"1 MPa\"\npoisson = 0.3\n"
@@ -348,6 +362,8 @@ TEST(AdaptiveResolution, RefusesByName) {
   EXPECT_THAT(refused("parts = [\"bat\"]\n"), HasSubstr("bat"));
   EXPECT_THAT(refused("coarsest = 2\n"), HasSubstr("2 x 2 x 2"));
   EXPECT_THAT(refused("max_elements = 30\n"), HasSubstr("\"max_elements\" allows 30"));
+  // "finest" = 0 would not do: alone it leaves nothing to change
+  EXPECT_THAT(refused("max_elements = 30\n"), HasSubstr("leave \"resolution\" out"));
   EXPECT_THAT(refused("", "[plasticity]\nyield = \"1 kPa\"\n"), HasSubstr("plasticity"));
   EXPECT_THAT(refused("", "[fracture]\nstrength = \"1 kPa\"\n"), HasSubstr("fracture"));
   EXPECT_THAT(refused("", "[parts.bar]\nmodel = \"springs\"\n"), HasSubstr("springs"));
