@@ -60,7 +60,9 @@ BlockMatrix matrix_of_effects(const Body& body, const BlockMatrix& pattern,
 
 BlockMatrix matrix_of_effects(const Body& body, const std::vector<std::uint8_t>& active,
                               const std::vector<ActiveEffect>& effects) {
-  const std::vector<std::uint8_t> pulled = pulled_elements(body, effects);
+  std::vector<std::uint8_t> pulled = pulled_elements(body, effects);
+  for (const ActiveEffect& effect : effects)
+    for (const std::uint32_t e : effect->may_pull_at()) pulled[e] = 1;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> blocks;
   for (std::uint32_t e = 0; e < pulled.size(); ++e)
     if (pulled[e]) blocks.emplace_back(e, e);

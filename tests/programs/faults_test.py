@@ -157,6 +157,7 @@ def test_picture():
 
 def test_no_thread_can_be_started():
     """With --threads 1 nothing changes; without, the result is the same or a line names that option."""
+    box()
     bent()
     none = dict(os.environ, LD_PRELOAD=library(), FLEXEL_FAULT="thread:1:1000000")
     for command, output in ((("flexel-voxelize", "box.stl", "--size", "5 mm"), "b.vtu"), (("flexel-simulate", "scene.toml", "body.vtu"), "s.vtu"),
