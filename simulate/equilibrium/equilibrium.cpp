@@ -255,7 +255,8 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   trial_.share = next;
   if (pushed_) push(trial_);
   std::optional<ShareScope> preparing;
-  if (reach_.first == 0) preparing.emplace(progress_, kBeforeSearch, kBeforeFirstStep, "preparing");
+  const bool first = reach_.first == 0 && done_ == 0;
+  if (first) preparing.emplace(progress_, kBeforeSearch, kBeforeFirstStep, "preparing");
   const std::vector<RigidLink> links = links_now(mechanics_.constraints());
   double most_gone = 0;  // a residual may rise again
   const NewtonProgress tell = [&](double gone, const std::string& note) {
@@ -270,8 +271,7 @@ bool LoadStepping::attempt(NewtonSteps steps, int max_iterations) {
   outcome_ = solver_ ? solver_(trial_, options, tell)
                      : newton_with_links(mechanics_, trial_, options, tell, &memory);
   result_.preconditioner = std::move(memory.preconditioner);
-  if (reach_.first == 0)
-    reach_.first = outcome_.first_reach / trial_.share;  // from rest: a near start moves by less
+  if (first) reach_.first = outcome_.first_reach / trial_.share;  // from rest: a near start moves by less
   result_.newton_iterations += outcome_.iterations;
   result_.cg_iterations += outcome_.cg_iterations;
   result_.linear_seconds += outcome_.linear_seconds;

@@ -19,6 +19,7 @@
 #include "base/stop.h"
 #include "simulate/linear/conjugate_gradients.h"
 #include "simulate/linear/multigrid.h"
+#include "simulate/linear/vector_products.h"
 
 namespace flexel::simulate {
 namespace {
@@ -33,6 +34,7 @@ constexpr int kMaxLinkCgIterations = 3000;
 // Of the elements' mean stiffness: nothing resists. A cantilever a thousand times as long as thick has that.
 constexpr double kFree = 1e-9;
 constexpr double kSlopeShare = 0.5;  // of the run's time: the first slope
+constexpr double kOthers = 1e-3;     // of the links' loads: other loads count
 
 using LinkVector = Eigen::VectorXd;
 
@@ -253,6 +255,8 @@ bool Balance::find() {
   // Where a step of the links makes the body touch something, its slope is another.
   const bool touches = mechanics_.unilateral();
   LinkVector left = lacking(state_);
+  const std::vector<Vec3> others = free_forces(led({}, 0));
+  const bool alone = std::sqrt(dot(others, others)) <= kOthers * scale_;
   Eigen::MatrixXd slope;
   bool serves = false;
   for (int k = 0; k < kMostLinkSteps; ++k) {
@@ -264,7 +268,8 @@ bool Balance::find() {
     move(step);
     const double from = std::max(gone_, kSlopeShare);
     const NewtonOutcome one = settle(from, 0.5 * (1 + from));
-    if (outcome_.iterations == 0) outcome_.first_reach = one.first_reach;
+    // Beside other loads the first linear answer is that of a body whose links are held.
+    if (outcome_.iterations == 0 && alone) outcome_.first_reach = one.first_reach;
     outcome_.iterations += one.iterations;
     outcome_.cg_iterations += one.cg_iterations;
     outcome_.linear_seconds += one.linear_seconds;
@@ -275,7 +280,8 @@ bool Balance::find() {
     if (now.norm() <= kLooser * options_.tolerance * scale_) return true;
     outcome_.trouble =
         fmt::format("the rigid link \"{}\" lacks {:.1e} of its load", links_[0]->name, now.norm() / scale_);
-    if (!touches && !(now.norm() < kAstray * left.norm())) return false;
+    // The first step does not know yet what other loads, as weight, lay on the links.
+    if (!touches && k > 0 && !(now.norm() < kAstray * left.norm())) return false;
     serves = now.norm() < kServes * left.norm();
     slope += (now - left - slope * step) * step.transpose() / step.squaredNorm();
     left = now;

@@ -145,6 +145,43 @@ TEST(RigidLink, ReactionsBalance) {
   EXPECT_LT(result.moment_imbalance.norm(), 1e-6 * moment);
 }
 
+std::string told_of(Body& body, const std::string& scene) {
+  const KeptWarnings kept;
+  solve(body, scene);
+  std::string told;
+  for (const std::string& line : kept.lines()) told += line + "\n";
+  return told;
+}
+
+// What else acts may weigh more on a link than its own load: the bar sags as far as without one, and nothing is told of buckling.
+TEST(RigidLink, WeightBesideALink) {
+  const testing::BoxOptions options{.cells = {20, 2, 2}, .spacing = Vec3::Constant(0.005)};
+  const std::string weight =
+      std::string("material = \"rubber\"\n") + kHeld + "[gravity]\nacceleration = [0, 0, \"-9.81 m/s2\"]\n";
+  Body linked = testing::box_body(options), free = testing::box_body(options);
+  const std::string told = told_of(linked, weight + link("force = [0, 0, \"-0.001 N\"]"));
+  EXPECT_EQ(told.find("buckle"), std::string::npos) << told;
+  solve(free, weight + link("force = [0, 0, \"-0.001 N\"]", "averaging"));
+  double farthest = 0, apart = 0;
+  for (std::size_t e = 0; e < free.element_count(); ++e) {
+    farthest = std::max(farthest, (free.position[e] - free.rest[e]).norm());
+    apart = std::max(apart, (linked.position[e] - free.position[e]).norm());
+  }
+  EXPECT_GT(farthest, 5e-3);
+  EXPECT_LT(apart, 0.03 * farthest);
+}
+
+// Loads that follow have no energy, and the tangent that links are asked with does not have them.
+TEST(RigidLink, BesideLoadsThatFollowNothingIsClaimed) {
+  const testing::BoxOptions options{.cells = {8, 2, 2}, .spacing = Vec3::Constant(0.005)};
+  const std::string scene = std::string("material = \"steel\"\n") + kHeld + link("force = [0, \"1 N\", 0]");
+  Body alone = testing::box_body(options), beside = testing::box_body(options);
+  EXPECT_EQ(told_of(alone, scene), "");
+  EXPECT_THAT(
+      told_of(beside, scene + "[[load]]\nwhere = \"box/z1\"\npressure = \"1 kPa\"\nfollower = true\n"),
+      HasSubstr("was not found out"));
+}
+
 // A column pressed along its axis stays straight, so only what is asked of the tangent tells that it buckles. Through a rigid
 // arm as long as itself, k L tan(k L) = 1 with k^2 = P / (E I): at .740 E I / L^2, and without one at pi^2 / 4.
 TEST(RigidLink, AColumnThatBucklesWithItsLinkIsTold) {
@@ -162,12 +199,10 @@ TEST(RigidLink, AColumnThatBucklesWithItsLinkIsTold) {
     const bool springs = std::string(each.model) == "springs";
     std::string material = kNoContraction;
     if (springs) material.replace(material.find("poisson = 0"), 11, "poisson = 0.25");
-    const KeptWarnings kept;
-    solve(body, std::string("model = \"") + each.model + "\"\n" + material + kHeld +
-                    link(fmt::format("force = [\"{} N\", 0, 0]\nat = [\"{} m\", \"5 mm\", \"5 mm\"]",
-                                     -each.load * bending / length / length, (1 + each.arm) * length)));
-    std::string told;
-    for (const std::string& line : kept.lines()) told += line + "\n";
+    const std::string told =
+        told_of(body, std::string("model = \"") + each.model + "\"\n" + material + kHeld +
+                          link(fmt::format("force = [\"{} N\", 0, 0]\nat = [\"{} m\", \"5 mm\", \"5 mm\"]",
+                                           -each.load * bending / length / length, (1 + each.arm) * length)));
     EXPECT_EQ(told.find("not stable") == std::string::npos, each.stable)
         << each.model << ", arm " << each.arm << ", load " << each.load << ": " << told;
   }
