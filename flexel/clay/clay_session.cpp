@@ -430,7 +430,9 @@ void ClaySession::draw(const Act& act) {
     said_.clear();
     arrive();
     stroke_ = {};
-    stroke_.carving.emplace().body = document_.now.body;
+    Carving begun;  // emplace(): clang 14 takes a nested class with defaults for one that cannot be made
+    begun.body = document_.now.body;
+    stroke_.carving = std::move(begun);
     rest();
     refuse_more_changes(document_);
   }

@@ -190,7 +190,7 @@ TEST(AdaptiveResolution, APressedPartOfLongCellsStays) {
   BoxOptions options = turned_box({6, 2, 2}, 1e-3);
   options.spacing = Vec3(3e-3, 1e-3, 1e-3);
   const Body body = box_body(options);
-  const Problem problem = problem_of(body, kCauchyGum);
+  const Problem problem = testing::problem_of(body, kCauchyGum);
   Progress quiet("test", Progress::Mode::quiet);
   AdaptiveResolution policy({}, body, 1);
   State state = bent(body, 5);
