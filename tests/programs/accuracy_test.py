@@ -103,7 +103,10 @@ def test_within():
     summary, said = deform([*beam(), "--within", "10s", "--verbose"])
     told = summary["accuracy"]
     runs = told["runs"]
-    # How long the last run really takes is up to who else is busy here; that it was to end in time is not.
+    # How long the last run really takes is up to who else is busy here, and it may be stopped for that; that it was to end in time is not.
+    if told.get("stopped"):
+        expect("took longer than predicted" in told["stopped"] and not told["met"] and "took longer than predicted" in said, told)
+        return
     expect(len(runs) > 1 and sum(run["seconds"] for run in runs[:-1]) + runs[-1]["predicted_seconds"] <= 10, told)
     expect(told["met"] == (told["seconds"] <= 10) and "--within 10s" in said, told)
     expect(runs[-1]["cells"] > 2 * runs[0]["cells"], told)
