@@ -148,11 +148,7 @@ void add_surface_load(const Load& load, const std::vector<std::uint32_t>& polygo
 // The selected elements, by the volume of the matter around them.
 std::vector<LoadedPoint> loaded_elements(const Load& load, const std::vector<std::uint32_t>& elements,
                                          const Problem& problem) {
-  if (load.pressure || load.bearing)
-    throw InputError(
-        load.origin,
-        fmt::format("load \"{}\": a {} needs a face, group or side; {} selects elements", load.name,
-                    load.pressure ? "pressure" : "bearing load", describe(load.where)));
+  require_load_on_elements(load);
   const std::vector<double> volume = element_volumes(problem);
   std::vector<LoadedPoint> loaded;
   double total = 0;
@@ -160,9 +156,7 @@ std::vector<LoadedPoint> loaded_elements(const Load& load, const std::vector<std
     loaded.push_back({problem.body.rest[e], volume[e]});
     total += volume[e];
   }
-  if (!(total > 0))
-    throw InputError(load.origin,
-                     fmt::format("load \"{}\": the selected elements hold no matter", load.name));
+  if (!(total > 0)) fail_without_matter(load);
   return loaded;
 }
 
@@ -187,6 +181,26 @@ bool parse_follower(TableReader& reader) {
   if (value->kind != SceneValue::Kind::boolean)
     reader.fail(value->line, "\"follower\" needs to be true or false");
   return value->flag;
+}
+
+void require_load_on_elements(const Load& load) {
+  if (load.pressure || load.bearing)
+    throw InputError(
+        load.origin,
+        fmt::format("load \"{}\": a {} needs a face, group or side; {} selects elements", load.name,
+                    load.pressure ? "pressure" : "bearing load", describe(load.where)));
+}
+
+void fail_without_matter(const Load& load) {
+  throw InputError(load.origin, fmt::format("load \"{}\": the selected elements hold no matter", load.name));
+}
+
+Selected loaded_by(const Load& load, const Body& body) {
+  Selected selected = resolve(load.where, body);
+  if (!selected.polygons.empty() && !selected.elements.empty())
+    throw InputError(load.origin,
+                     fmt::format("load \"{}\" mixes surface and elements; write two loads", load.name));
+  return selected;
 }
 
 std::vector<Vec3> load_forces(const Load& load, const std::vector<LoadedPoint>& points) {
@@ -233,10 +247,7 @@ std::optional<Loads> Loads::make(const Parameters& parameters, const Problem& pr
   Loads loads;
   loads.body_ = &problem.body;
   for (const Load& load : parameters.loads) {
-    const Selected selected = resolve(load.where, problem.body);
-    if (!selected.polygons.empty() && !selected.elements.empty())
-      throw InputError(load.origin,
-                       fmt::format("load \"{}\" mixes surface and elements; write two loads", load.name));
+    const Selected selected = loaded_by(load, problem.body);
     Spread made{load.name, load.course, {}, load.torque.has_value() || load.at.has_value()};
     const bool on_surface = selected.elements.empty();
     if (load.follower) {

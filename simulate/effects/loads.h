@@ -29,6 +29,13 @@ struct Load {
 // The key `follower` of a [[load]].
 [[nodiscard]] bool parse_follower(TableReader& reader);
 
+// What a load acts on: polygons or elements. Throws InputError: both.
+[[nodiscard]] Selected loaded_by(const Load& load, const Body& body);
+// Throws InputError: a pressure or a bearing load, which elements do not take.
+void require_load_on_elements(const Load& load);
+// Throws InputError: the selected elements hold no matter.
+[[noreturn]] void fail_without_matter(const Load& load);
+
 // Forces [N] of a load at points of the surface or of elements that stand for all of it, by its kind. Throws
 // InputError: a bearing load on a face that does not look against it, a moment about points on a line.
 struct LoadedPoint;

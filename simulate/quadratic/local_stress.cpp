@@ -809,6 +809,8 @@ std::string local_stress_lacks(const QuadraticSystem& system) {
   if (!system.linked().empty()) return "rigid links and rigid parts";
   if (system.follows()) return "loads that follow the shape";
   if (system.heated()) return "heat and shrinkage";
+  for (const NodalLoad& load : system.loads())
+    if (load.on_elements) return fmt::format("loads on boxes of elements (\"{}\")", load.name);
   for (const NitscheSupport& support : system.supports())
     if (!support.nodes.empty())
       return fmt::format("fixes and moves by boxes of elements (\"{}\")", support.tie->name);

@@ -19,6 +19,7 @@
 #include "simulate/matter/load_distribution.h"
 #include "simulate/matter/surface_samples.h"
 #include "simulate/models/cells.h"
+#include "simulate/quadratic/cells/matter_points.h"
 #include "simulate/thermal/thermal.h"
 
 namespace flexel::simulate {
@@ -308,15 +309,13 @@ bool QuadraticSystem::links_follow() const {
 
 void QuadraticSystem::place_loads(const std::vector<Load>& loads) {
   for (const Load& load : loads) {
-    const Selected selected = resolve(load.where, problem_.body);
+    const Selected selected = loaded_by(load, problem_.body);
+    if (!selected.elements.empty()) {
+      loads_.push_back(load_on_elements(load, selected.elements));
+      continue;
+    }
     NodalLoad made{load.name, std::vector<Vec3>(nodes_.size(), Vec3::Zero()),
                    load.torque.has_value() || load.at.has_value()};
-    if (!selected.elements.empty() || selected.polygons.empty())
-      throw InputError(
-          load.origin,
-          fmt::format("load \"{}\": model \"quadratic\" takes loads on faces, groups and sides; {} "
-                      "selects elements",
-                      load.name, describe(load.where)));
     const std::vector<FacePoint> points = face_points(problem_, nodes_, selected.polygons, box());
     if (points.empty() && cut_.surroundings == nullptr)
       throw InputError(load.origin,
@@ -336,6 +335,28 @@ void QuadraticSystem::place_loads(const std::vector<Load>& loads) {
     if (load.follower) made.follower = follower(load, points, loaded);
     loads_.push_back(std::move(made));
   }
+}
+
+NodalLoad QuadraticSystem::load_on_elements(const Load& load,
+                                            const std::vector<std::uint32_t>& elements) const {
+  require_load_on_elements(load);
+  const std::vector<MatterPoint> points = matter_points(
+      problem_.body, nodes_, elements, [&](std::size_t c) { return moments(c); },
+      [&](std::size_t c) -> const Lattice& { return lattice(c); });
+  if (points.empty()) fail_without_matter(load);
+  NodalLoad made{load.name, std::vector<Vec3>(nodes_.size(), Vec3::Zero()),
+                 load.torque.has_value() || load.at.has_value()};
+  made.on_elements = true;
+  std::vector<LoadedPoint> loaded;
+  for (const MatterPoint& each : points) loaded.push_back(each.point);
+  const std::vector<Vec3> forces = load_forces(load, loaded);
+  for (std::size_t q = 0; q < points.size(); ++q)
+    for (const auto& [node, share] : points[q].carriers) made.forces[node] += share * forces[q];
+  if (load.follower)
+    made.follower = turning_load(load, loaded, [&](std::size_t q, const auto& each) {
+      for (const auto& [node, share] : points[q].carriers) each(node, share);
+    });
+  return made;
 }
 
 // N, at each of the points that the load acts on.

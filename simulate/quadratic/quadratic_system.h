@@ -18,6 +18,7 @@ struct NodalLoad {
   std::vector<Vec3> forces;                          // (nodes x 3) N, at rest
   bool couple = false;                               // it was given a torque, or a point where its force acts
   std::unique_ptr<FollowerLoad> follower = nullptr;  // in place of the forces where deflections are large
+  bool on_elements = false;
 
   // N (nodes x 3), added to `sum` where the nodes have gone by `displacement`.
   void add_to(const std::vector<Vec3>& displacement, double share, std::vector<Vec3>& sum) const;
@@ -154,6 +155,8 @@ class QuadraticSystem {
   void place_bonds(const Bonds::Parameters& parameters);
   void find_bearing_limits();
   void place_loads(const std::vector<Load>& loads);
+  [[nodiscard]] NodalLoad load_on_elements(const Load& load,
+                                           const std::vector<std::uint32_t>& elements) const;
   [[nodiscard]] std::unique_ptr<FollowerLoad> follower(const Load& load, const std::vector<FacePoint>& points,
                                                        const std::vector<LoadedPoint>& loaded) const;
   [[nodiscard]] std::vector<Vec3> forces_at(const Load& load, const std::vector<FacePoint>& points,

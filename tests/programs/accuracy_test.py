@@ -46,17 +46,36 @@ def test_a_part_that_the_model_for_thin_walls_refuses():
     expect("--model quadratic" not in said and summary["simulate"]["largest_displacement"] > 0, said)
 
 
-def test_a_thin_lip_of_a_thick_block_gets_the_surer_model():
-    # Its wall of 1 mm holds 2 % of the matter: no reason for another model, but the first answer of `cells` is rough.
-    profile = [(0, 0), (40, 0), (40, 39), (70, 39), (70, 40), (0, 40)]
+def block_with_lip(thickness):
+    """mm; the lip reaches 30 mm beyond the block."""
+    low = 40 - thickness
+    profile = [(0, 0), (40, 0), (40, low), (70, low), (70, 40), (0, 40)]
     vertices = "".join(f"v {x} {y} {z}\n" for y in (0, 20) for x, z in profile)
     sides = "".join(f"f {i + 1} {i + 7} {(i + 1) % 6 + 7} {(i + 1) % 6 + 1}\n" for i in range(6))
     write("lip.obj", vertices + sides + "f 1 2 3 4 5 6\nf 12 11 10 9 8 7\n")
+
+
+def test_a_thin_lip_of_a_thick_block_gets_the_surer_model():
+    # Its wall of 1 mm holds 2 % of the matter: no reason for another model, but the first answer of `cells` is rough.
+    block_with_lip(1)
     found, said = deform(["lip.obj", "--material", "PLA", "--fix", "zmin", "--push", "xmax: 0 0 -1 N"])
     expect("--model quadratic" in said, f"the model that goes on is not named: {said}")
     moved, bar = found["simulate"]["largest_displacement"], found["accuracy"]["reached"]
     beam = 1 * 0.03**3 / (3 * 3.5e9 * 0.02 * 0.001**3 / 12)  # m, of the lip by itself; the block gives a little
     expect(bar < 0.2 and abs(moved / beam - 1) < 0.12, f"{moved} m within {bar}, a beam moves {beam} m")
+
+
+def test_the_surer_model_is_asked_wherever_the_error_is_missed():
+    # One of 4 mm: `cells` is off by up to 18 %, of which a thousand cells of `quadratic` leave 10.
+    block_with_lip(4)
+    options = ["lip.obj", "--material", "PLA", "--fix", "zmin", "--push", "xmax: 0 0 -1 N", "--accuracy"]
+    found, said = deform([*options, "12%"])
+    runs = found["accuracy"]["runs"]
+    expect("--model quadratic" in said and len(runs) == 1 and runs[0]["cells"] < 2000, f"{runs} {said}")
+    whole, said = deform([*options, "25%"])
+    expect("--model quadratic" not in said, said)
+    moved = [each["simulate"]["largest_displacement"] for each in (found, whole)]
+    expect(abs(moved[1] / moved[0] - 1) < found["accuracy"]["reached"] + whole["accuracy"]["reached"], f"{moved}")
 
 
 def test_a_load_out_of_proportion_is_told_by_the_model_for_thin_walls():

@@ -136,6 +136,50 @@ TEST(Quadratic, HangingBarIsExact) {
   }
 }
 
+// Spread over all elements a force is a weight: the same exact answer.
+TEST(Quadratic, ALoadOnAllElementsIsAWeight) {
+  for (const double share : {1.0, 0.4}) {
+    Body body = bar(share);
+    const double mass = 1000 * 0.04 * 0.02 * 0.01 * (1 + share);
+    const SimulateResult result =
+        run(body, material(0) + fmt::format("[[fix]]\nwhere = \"x0\"\n[[load]]\nwhere = {{ box = {{ min = "
+                                            "[\"-1 m\", \"-1 m\", \"-1 m\"], "
+                                            "max = [\"1 m\", \"1 m\", \"1 m\"] }} }}\nforce = [\"{} N\", 0, "
+                                            "0]\n[[probe]]\nname = \"end\"\nwhere = "
+                                            "\"x1\"\n",
+                                            10 * mass));
+    EXPECT_NEAR(result.probes[0].displacement.x() / (1000 * 10 * 0.04 * 0.04 / (2 * kYoung)), 1, 1e-5)
+        << share;
+    EXPECT_NEAR(result.reactions[0].force.x() / (-10 * mass), 1, 1e-7);
+  }
+}
+
+// A remote force on the elements of the end bends the bar as it does on the face of the end, turning with it or not: forces
+// whose resultant is the same do, a little away (Saint-Venant).
+TEST(Quadratic, AForceOnElementsActsAtItsPoint) {
+  for (const double share : {1.0, 0.4})
+    for (const char* follower : {"false", "true"}) {
+      double found[2];
+      int i = 0;
+      for (const char* where :
+           {"\"x1\"",
+            "{ box = { min = [\"39 mm\", \"-1 m\", \"-1 m\"], max = [\"1 m\", \"1 m\", \"1 m\"] } }"}) {
+        Body body = bar(share);
+        const SimulateResult result = run(
+            body,
+            material(0.3) +
+                fmt::format("[[fix]]\nwhere = \"x0\"\n[[load]]\nwhere = {}\nforce = [0, 0, \"1e-4 N\"]\n"
+                            "at = [\"80 mm\", \"10 mm\", \"10 mm\"]\ntorque = [\"1e-6 N m\", 0, 0]\n"
+                            "follower = {}\n[[probe]]\nname = \"middle\"\nat = [\"25 mm\", \"15 mm\", \"5 "
+                            "mm\"]\n",
+                            where, follower));
+        found[i++] = result.probes[0].displacement.z();
+        EXPECT_LT(result.moment_imbalance.norm(), 1e-6 * 1e-4 * 0.08) << where;
+      }
+      EXPECT_NEAR(found[1] / found[0], 1, 0.01) << share << follower;
+    }
+}
+
 // 2 x .5 x .5, E = 1, nu = .3: 528.2 +- .2 (CalculiX C3D20R, n = 4, 6, 9, extrapolated).
 TEST(Quadratic, CantileverOfOneAndTwoCells) {
   for (const auto& [cells, off] : {std::pair{1, 0.03}, {2, 0.01}}) {
@@ -440,6 +484,11 @@ TEST(Quadratic, WhatItDoesNotHaveIsRefusedByName) {
               HasSubstr("use model \"cells\""));
   EXPECT_THAT(refusal(bar(), material(0.3) + "[[fix]]\nwhere = \"x0\"\n" + pull({200, 0, 0})),
               HasSubstr("matter is strained by"));
+  EXPECT_THAT(
+      refusal(bar(), material(0.3) +
+                         "[[fix]]\nwhere = \"x0\"\n[[load]]\nwhere = { half_space = { point = [0, 0, 0], "
+                         "normal = [-1, 0, 0] } }\npressure = \"1 Pa\"\n"),
+      HasSubstr("a pressure needs a face, group or side"));
   EXPECT_THAT(refusal(bar(), "material = \"steel\"\nmodel = \"quadratc\"\n[[fix]]\nwhere = \"x0\"\n"),
               HasSubstr("did you mean \"quadratic\"?"));
 }
