@@ -103,7 +103,6 @@ class Contacts {
   ContactStepBound bound_;
   ContactLoads loads_;
   ImplicitContact implicit_;
-  PointLoads point_loads_;        // of add_forces()
   bool stepping_ = false;         // within an implicit step
   double stored_ = 0;             // J, as it began
   double numerical_ = 0;          // J, of Energies

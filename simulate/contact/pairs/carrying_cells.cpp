@@ -4,7 +4,23 @@
 #include <algorithm>
 #include <numeric>
 
+#include "base/instruction_set.h"
+
 namespace flexel::simulate {
+
+static_assert(sizeof(ContactSide) == sizeof(double) * contact_kernels::kSideRow &&
+              sizeof(PointState) == sizeof(double) * contact_kernels::kPointRow &&
+              sizeof(PointMotion) == sizeof(double) * contact_kernels::kMotionRow);
+
+const contact_kernels::ContactTable& contact_kernel_table() {
+  using namespace contact_kernels;
+#if defined(__x86_64__)
+  static const ContactTable& best = best_table(&contacts_portable, &contacts_avx2, &contacts_avx512);
+  return best;
+#else
+  return contacts_portable();
+#endif
+}
 
 CarryingCells::CarryingCells(const ContactSurface& surface) : surface_(surface) {
   for (std::uint32_t p = 0; p < surface.body().parts.size(); ++p) {
@@ -27,6 +43,9 @@ void CarryingCells::reset(const PairList& list) {
   });
   cells_.clear();
   points_.resize(points.size());
+  states_.resize(points.size());
+  motions_.resize(points.size());
+  wanted_by_.resize(points.size(), 0);
   for (std::size_t n = 0; n < order.size(); ++n) {
     const ContactPoint& point = list.point(order[n]);
     if (n == 0 || point.at.count != 8 || elements_of(order[n]) != elements_of(order[n - 1])) {
@@ -40,6 +59,25 @@ void CarryingCells::reset(const PairList& list) {
     points_[order[n]] = carried(point, surface_.broken(points[order[n]]));
     points_[order[n]].cell = static_cast<std::uint32_t>(cells_.size() - 1);
   }
+}
+
+void CarryingCells::want_none() {
+  ++asked_;
+  wanted_.clear();
+}
+
+void CarryingCells::place(const State& state, bool moving) {
+  constexpr std::size_t kGrain = 256;
+  if (points_.empty()) return;
+  parallel_chunks(wanted_.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    auto* states = reinterpret_cast<double*>(states_.data());
+    const std::uint32_t* which = wanted_.data() + begin;
+    contact_kernel_table().place(points_.data(), which, end - begin, state.displacement.data()->data(),
+                                 states);
+    if (moving)
+      contact_kernel_table().move(points_.data(), which, end - begin, state.velocity.data()->data(), states,
+                                  reinterpret_cast<double*>(motions_.data()));
+  });
 }
 
 CarriedPoint CarryingCells::carried(const ContactPoint& point, bool broken) const {

@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kStiffness = 3;       // of a contact, in E / h an area
 constexpr double kSoft = 0.01;         // of a spacing, over which pressure begins
+constexpr double kFarthestSoft = 0.4;  // of a spacing, that an impact makes it at most
 constexpr double kMostPullOff = 0.35;  // spacings, at most, of the extension at which adhesion ends
 
 }  // namespace
@@ -32,8 +33,8 @@ PairProperties ContactMaterials::between(std::uint32_t i, std::uint32_t j) const
   const ContactPoint &a = surface_.points()[i], &b = surface_.points()[j];
   // the faces beside an edge have all of the adhering area
   const bool edged = a.shape == ContactShape::edge || b.shape == ContactShape::edge;
-  return {0.5 * (friction(i) + friction(j)), constants(i, j),
-          edged ? 0 : pull_off(i, 0.5 * (stick(i) + stick(j)), foundation(i, j))};
+  return {constants(i, j), 0.5 * (friction(i) + friction(j)),
+          edged ? 0 : pull_off(i, 0.5 * (stick(i) + stick(j)), foundation(i, j)), kFarthestSoft * a.width};
 }
 
 PairProperties ContactMaterials::against_plane(std::uint32_t point, const ContactPlane& plane) const {
@@ -41,8 +42,8 @@ PairProperties ContactMaterials::against_plane(std::uint32_t point, const Contac
   const double own = friction(point);
   const double traction =
       at.shape == ContactShape::edge ? 0 : 0.5 * (stick(point) + plane.stick.value_or(stick(point)));
-  return {0.5 * (own + plane.friction.value_or(own)), plane_constants(point),
-          pull_off(point, traction, foundation_[at.part])};
+  return {plane_constants(point), 0.5 * (own + plane.friction.value_or(own)),
+          pull_off(point, traction, foundation_[at.part]), kFarthestSoft * at.width};
 }
 
 bool ContactMaterials::dissipate() const {

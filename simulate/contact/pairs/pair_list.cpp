@@ -180,7 +180,7 @@ void PairList::add_pairs(const std::vector<Vec3>& positions, const std::vector<V
       const std::uint32_t i = in_grid[a], j = in_grid[b];
       const PairProperties properties = materials_.between(i, j);
       pairs_.push_back(
-          {i, j, 0, std::uint64_t{i} << 32 | j, properties, rest_overlaps_.of(i, j, properties.constants)});
+          {properties, rest_overlaps_.of(i, j, properties.constants), std::uint64_t{i} << 32 | j, i, j});
     }
 }
 
@@ -193,8 +193,8 @@ void PairList::add_plane_pairs(const std::vector<Vec3>& positions, const std::ve
       if ((positions[i] - plane.point).dot(plane.normal) - points[i].radius > skin_) continue;
       if (normals[i] != Vec3::Zero() && -normals[i].dot(plane.normal) < points[i].facing_from - turning())
         continue;
-      pairs_.push_back({i, ContactPair::kOfPlane, p, std::uint64_t{i} << 32 | (points.size() + p),
-                        materials_.against_plane(i, plane), 0});
+      pairs_.push_back({materials_.against_plane(i, plane), 0, std::uint64_t{i} << 32 | (points.size() + p),
+                        i, ContactPair::kOfPlane, p});
     }
   }
 }

@@ -33,6 +33,13 @@ void PairSchedule::wake_all() {
   awake_.resize(couple_.size());
   std::iota(awake_.begin(), awake_.end(), std::uint32_t{0});
   left_ = {0, 0};
+  soon_.clear();
+}
+
+void PairSchedule::wake(std::uint32_t pair) {
+  keep_awake(pair);
+  const auto at = std::lower_bound(soon_.begin(), soon_.end(), pair);
+  if (at == soon_.end() || *at != pair) soon_.insert(at, pair);
 }
 
 SafeMotion PairSchedule::sums(const Bodies& of, const std::vector<BodyMotion>& motions) {
