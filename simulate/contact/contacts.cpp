@@ -153,12 +153,15 @@ void Contacts::end_implicit_step(const State& state) {
 // Without pairs nothing happens in a step; whether there are is asked before the next one.
 void Contacts::finish_step(const State& state, double drift) {
   is_current_ = false;
+  went_through_ = true;
   if (list_.built() && list_.pairs().empty()) return;
   update_list(state, false);
   states_.go_through(state, drift, dissipate(), settings_.damping);
 }
 
 void Contacts::finish_losses(const State& state, double drift) {
+  if (!went_through_) finish_step(state, drift);
+  went_through_ = false;
   friction_.finish_step(state, drift, dissipate());
 }
 

@@ -63,6 +63,8 @@ class CarryingCells {
 
   const ContactSurface& surface_;
   std::vector<CarryingCell> cells_;
+  std::vector<std::uint32_t> places_,
+      cell_;  // (elements) in PairList::elements(); (cells) in cells_: of reset()
   std::vector<CarriedPoint> points_;
   std::vector<std::array<Vec3, 3>> slopes_;  // (parts)
   std::vector<Vec3> steepness_;              // (parts) 1/m, norms of the slopes

@@ -28,8 +28,8 @@ PairStates::PairStates(const ContactSettings& settings, const ContactSurface& su
       cells_(surface) {}
 
 void PairStates::reset() {
-  states_.assign(list_.pairs().size(), PairState{});
-  rubbing_.assign(list_.pairs().size(), PairRubbing{});
+  states_.resize(list_.pairs().size());
+  rubbing_.resize(list_.pairs().size());
   is_active_.assign(list_.pairs().size(), 0);
   active_.clear();
   acting_.clear();
