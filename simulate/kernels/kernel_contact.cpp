@@ -76,6 +76,12 @@ FLEXEL_INLINE Lanes bits_of(const LaneMask& flags) {
   return made;
 }
 
+FLEXEL_INLINE bool any(const LaneMask& mask) {
+  long long bits = 0;
+  for (std::size_t l = 0; l < kLanes; ++l) bits |= mask[l];
+  return bits != 0;
+}
+
 // Of a bool in a row, whose other bytes are anything.
 FLEXEL_INLINE LaneMask is_flagged(const Lanes& value) {
   LaneMask bits;
@@ -134,6 +140,14 @@ FLEXEL_INLINE void store_three(double* to, const FourDoubles& value) {
   const TwoDoubles two = {value[0], value[1]};
   __builtin_memcpy(to, &two, sizeof two);
   to[2] = value[2];
+}
+
+// What store_three() has written a moment ago: in its two pieces it need not wait for the cache.
+FLEXEL_INLINE FourDoubles load_stored_three(const double* from) {
+  using TwoDoubles = double __attribute__((vector_size(16)));
+  TwoDoubles two;
+  __builtin_memcpy(&two, from, sizeof two);
+  return FourDoubles{two[0], two[1], from[2], 0};
 }
 
 FLEXEL_INLINE void store_four(double* to, const FourDoubles& value) {
@@ -372,18 +386,20 @@ struct Smooth {
 };
 
 FLEXEL_INLINE Smooth kernel(const Lanes& squared, const Lanes& width) {
-  const Lanes q = 1 - squared / (width * width);
-  const Lanes scale = 3 / (3.14159265358979323846 * width * width);
+  const Lanes per_square = 1 / (width * width);
+  const Lanes q = 1 - squared * per_square;
+  const Lanes scale = (3 / 3.14159265358979323846) * per_square;
   const LaneMask flat = ~(width > 0), none = ~flat & ~(q > 0);
   return {pick(flat, Lanes{} + 1, pick(none, Lanes{}, scale * q * q)),
-          pick(flat | none, Lanes{}, -2 * scale * q / (width * width))};
+          pick(flat | none, Lanes{}, -2 * scale * q * per_square)};
 }
 
 FLEXEL_INLINE Smooth ramp(const Lanes& at, const Lanes& from, const Lanes& to) {
-  const Lanes s = (at - from) / (to - from);
+  const Lanes per_length = 1 / (to - from);
+  const Lanes s = (at - from) * per_length;
   const LaneMask below = s <= 0, above = s >= 1;
   return {pick(below, Lanes{}, pick(above, Lanes{} + 1, s * s * (3 - 2 * s))),
-          pick(below | above, Lanes{}, 6 * s * (1 - s) / (to - from))};
+          pick(below | above, Lanes{}, 6 * s * (1 - s) * per_length)};
 }
 
 // Columns of PairState.
@@ -401,14 +417,14 @@ FLEXEL_INLINE void press(Evaluated& now, const Sides& side, const Lanes& soft, c
   const Lanes hardening = pick(inside, depth * depth / (hard * hard), Lanes{});
   Lanes energy = pick(inside, 0.25 * hardening * depth * depth, Lanes{});
   Lanes pressure = pick(inside, hardening * depth, Lanes{});
-  energy +=
-      pick(touches,
-           pick(softly, delta * delta * delta / (6 * soft), 0.5 * delta * (delta - soft) + soft * soft / 6),
-           Lanes{});
-  pressure += pick(touches, pick(softly, delta * delta / (2 * soft), delta - 0.5 * soft), Lanes{});
+  const Lanes share = delta / soft;
+  energy += pick(
+      touches,
+      pick(softly, (1.0 / 6) * delta * delta * share, 0.5 * delta * (delta - soft) + (1.0 / 6) * soft * soft),
+      Lanes{});
+  pressure += pick(touches, pick(softly, 0.5 * delta * share, delta - 0.5 * soft), Lanes{});
   const LaneMask presses = pressure > 0;
   now.stiffness = now.weight * pick(inside, 1 + 3 * hardening, Lanes{} + 1);
-  const Lanes share = delta / soft;
   now.share = pick(presses, pick(share < 0, Lanes{}, pick(share > 1, Lanes{} + 1, share)), Lanes{});
   energy = pick(presses, energy, Lanes{});
   now.energy = now.weight * energy;
@@ -439,7 +455,8 @@ FLEXEL_INLINE void evaluate_block(const Sides& side, const Constants& k, const L
   const LaneMask balls = (side.radius[0] > 0) & (side.radius[1] > 0);
   now.near &= balls | (length > 0);
   const Lanes distance = dot(d, d);
-  now.normal = pick(balls, pick(distance > 0, d / square_root(distance), d), b / length);
+  now.normal = (1 / length) * b;
+  if (any(balls)) now.normal = pick(balls, pick(distance > 0, d / square_root(distance), d), now.normal);
   now.along = dot(d, now.normal);
   now.gap = now.along - side.radius[0] - side.radius[1] + allowed;
   now.offset = pick(balls, Three{Lanes{}, Lanes{}, Lanes{}}, d - now.along * now.normal);
@@ -550,12 +567,6 @@ FLEXEL_INLINE Lanes softness_after(const Evaluated& now, const LaneMask& presses
   const Lanes chosen = smaller(way, smaller(k.soft + 2 * larger(now.gap, Lanes{}), farthest));
   return pick(presses, pick(hardened < kHardened * k.soft, Lanes{}, hardened),
               pick(now.near & ~now.deep & ~(now.gap > way) & (chosen > k.soft), chosen, Lanes{}));
-}
-
-FLEXEL_INLINE bool any(const LaneMask& mask) {
-  long long bits = 0;
-  for (std::size_t l = 0; l < kLanes; ++l) bits |= mask[l];
-  return bits != 0;
 }
 
 // To the softness after the step. Returns what that takes [J].
@@ -842,7 +853,7 @@ FLEXEL_INLINE void add_to_elements(const CarriedPoint& point, const double* row,
   }
   for (std::uint32_t a = 0; a < point.count; ++a) {
     double* to = forces + 3 * std::size_t{point.elements[a]};
-    store_three(to, load_three(to) + on[a]);
+    store_three(to, load_stored_three(to) + on[a]);
   }
 }
 

@@ -56,7 +56,6 @@ class TimeSegment {
   // Chooses the length of the steps from here to clock.until. Throws DivergedError: it has fallen to nothing;
   // InputError: at the first step, where the scene's step is above the stable one.
   void choose_step(Clock& clock);
-  void choose_step_as_seen(Clock& clock);  // without that look
   // Looks at the present state for choose_step(), which does so itself. Throws InputError: what has joined
   // overlaps.
   void look();
@@ -142,6 +141,7 @@ class TimeSegment {
   [[nodiscard]] std::unique_ptr<EnergyHistory> make_history(EnergyBalance balance) const;
 
  private:
+  void choose_step_as_seen(Clock& clock);  // without the look at the state
   class ModelTimer;
   void configure_kernel();
   void add_fused();
