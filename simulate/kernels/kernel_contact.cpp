@@ -82,13 +82,6 @@ FLEXEL_INLINE bool any(const LaneMask& mask) {
   return bits != 0;
 }
 
-// Of a bool in a row, whose other bytes are anything.
-FLEXEL_INLINE LaneMask is_flagged(const Lanes& value) {
-  LaneMask bits;
-  __builtin_memcpy(&bits, &value, sizeof bits);
-  return (bits & 0xff) != 0;
-}
-
 // Rows to columns and back.
 FLEXEL_INLINE void transpose(Lanes r[8]) {
   constexpr LaneBits even = {0, 8, 2, 10, 4, 12, 6, 14}, odd = {1, 9, 3, 11, 5, 13, 7, 15};
@@ -318,6 +311,7 @@ void place(const CarriedPoint* points, const std::uint32_t* which, std::size_t c
 struct Sides {
   Three position[2], normal[2];
   Lanes own_plane[2], radius[2];
+  LaneMask plane;
 };
 
 FLEXEL_INLINE void read_sides(const PairView& pairs, const Block& block, Sides& made) {
@@ -336,6 +330,7 @@ FLEXEL_INLINE void read_sides(const PairView& pairs, const Block& block, Sides& 
   made.position[1] = {j[0], j[1], j[2]};
   made.normal[1] = {j[3], j[4], j[5]};
   const LaneMask plane = planes != 0;  // the foot on it; its normal is the exact one
+  made.plane = plane;
   const Lanes height = dot(made.position[0] - made.position[1], made.normal[1]);
   made.position[1] = pick(plane, made.position[0] - height * made.normal[1], made.position[1]);
   made.own_plane[0] = pick(plane, Lanes{}, i[6]);
@@ -524,25 +519,21 @@ struct Meeting {
   LaneMask plane;
 };
 
+// A ball meets at its centre, which alone can carry a force; a shapeless point likewise. Both have no normal.
 FLEXEL_INLINE void read_meeting(const PairView& pairs, const Block& block, const Sides& side,
                                 const double* motions, Meeting& made) {
   std::uint32_t i[kLanes], j[kLanes];
-  Lanes planes = {}, shapeless_i = {}, shapeless_j = {};
   for (std::size_t l = 0; l < kLanes; ++l) {
     const PairSides& of = pairs.sides[block.at[l]];
     i[l] = of.i;
     j[l] = of.of_plane ? of.i : of.j;
-    planes[l] = of.of_plane;
-    shapeless_i[l] = pairs.points[kPointRow * i[l] + kShapeless];
-    shapeless_j[l] = pairs.points[kPointRow * j[l] + kShapeless];
   }
   const Three zero = {Lanes{}, Lanes{}, Lanes{}};
   made.of[0] = read_motion(motions, i);
   made.of[1] = read_motion(motions, j);
-  made.plane = planes != 0;
+  made.plane = side.plane;
   made.d = pick(made.plane, zero, side.position[1] - side.position[0]);
-  const LaneMask centred_i = (side.radius[0] > 0) | is_flagged(shapeless_i),
-                 centred_j = (pick(made.plane, side.radius[0], side.radius[1]) > 0) | is_flagged(shapeless_j);
+  const LaneMask centred_i = is_zero(side.normal[0]), centred_j = is_zero(side.normal[1]);
   made.share = pick(centred_i == centred_j, Lanes{} + 0.5, pick(centred_i, Lanes{}, Lanes{} + 1));
 }
 
@@ -684,16 +675,15 @@ struct Rates {
 };
 
 FLEXEL_INLINE Rates read_rates(const PairView& pairs, const Block& block, const Sides& side) {
-  Lanes i = {}, j = {}, planes = {};
+  Lanes i = {}, j = {};
   for (std::size_t l = 0; l < kLanes; ++l) {
     const PairSides& of = pairs.sides[block.at[l]];
     i[l] = pairs.points[kPointRow * of.i + kNormalRate];
     j[l] = of.of_plane ? 0 : pairs.points[kPointRow * of.j + kNormalRate];
-    planes[l] = of.of_plane;
   }
   return {larger(i, j),
           larger(pick(side.own_plane[0] > 0, i, Lanes{}), pick(side.own_plane[1] > 0, j, Lanes{})),
-          planes != 0};
+          side.plane};
 }
 
 struct Safe {
