@@ -2,9 +2,7 @@
 #include "simulate/contact/pairs/contact_materials.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "simulate/models/rest_shape.h"
 
@@ -12,9 +10,9 @@ namespace flexel::simulate {
 namespace {
 
 constexpr double kStiffness = 3;  // of a contact, in E / h an area
-// Radius of the kernel, of a spacing: its middle is 1, so that faces whose lattices lie on each other have one pair a patch
-// with all of its weight, and none with next to none.
-const double kReach = std::sqrt(3 / std::numbers::pi);
+// Radius of the kernel, of a spacing: a little less than one, so that faces whose lattices lie on each other have no pairs
+// of neighbours with next to no weight.
+constexpr double kReach = 0.995;
 constexpr double kSoft = 0.01;         // of a spacing, over which pressure begins
 constexpr double kFarthestSoft = 0.4;  // of a spacing, that an impact makes it at most
 constexpr double kMostPullOff = 0.35;  // spacings, at most, of the extension at which adhesion ends
