@@ -8,11 +8,6 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr std::size_t kChunk = 256;
-
-static_assert(sizeof(PairRubbing) == sizeof(double) * contact_kernels::kRubbingRow &&
-              sizeof(PairRecord) == sizeof(double) * contact_kernels::kRecordRow);
-
 Vec3 at_most(const Vec3& value, double most) {
   const double norm = value.norm();
   return norm > most ? Vec3(value * (most / norm)) : value;
@@ -21,7 +16,7 @@ Vec3 at_most(const Vec3& value, double most) {
 }  // namespace
 
 ContactFriction::ContactFriction(double damping, const ContactSurface& surface, const PairList& list,
-                                 const PairStates& states, PairMemory& memory)
+                                 PairStates& states, PairMemory& memory)
     : damping_(damping), surface_(surface), list_(list), states_(states), memory_(memory) {}
 
 // From each point. A ball meets at its centre, which alone can carry a force; a shapeless point likewise.
@@ -35,41 +30,12 @@ std::array<Vec3, 2> ContactFriction::meeting_place(const ContactPair& pair) cons
   return {share * d, (share - 1) * d};
 }
 
-// finish_step() asks for the motions that loads() of the next step asks for again.
-bool ContactFriction::find_motions(const State& state) {
-  if (evaluation_ == states_.evaluations() && velocities_.size() == list_.elements().size() &&
-      same_bits(list_.runs(), state.velocity, velocities_))
-    return false;
-  evaluation_ = states_.evaluations();
-  velocities_.resize(list_.elements().size());
-  gather(list_.runs(), state.velocity, velocities_);
-  motions_.resize(list_.points().size());
-  point_found_.resize(motions_.size(), 0);
-  wanted_.clear();
-  ++found_;
-  const auto find = [&](std::uint32_t point) {
-    if (std::exchange(point_found_[point], found_) != found_) wanted_.push_back(point);
-  };
-  for (const std::uint32_t p : states_.active()) {
-    if (!(states_[p].pressure > 0) && !(list_.pairs()[p].properties.pull_off > 0)) continue;
-    const contact_kernels::PairSides& of = states_.sides()[p];
-    find(of.i);
-    if (!of.of_plane) find(of.j);
-  }
-  static_assert(sizeof(PointMotion) == sizeof(double) * contact_kernels::kMotionRow);
-  parallel_chunks(wanted_.size(), 256, [&](std::size_t begin, std::size_t end) {
-    contact_kernel_table().move(
-        states_.cells().points().data(), wanted_.data() + begin, end - begin, state.velocity.data()->data(),
-        reinterpret_cast<const double*>(states_.points().data()), reinterpret_cast<double*>(motions_.data()));
-  });
-  return true;
-}
-
 // m/s, of j against i where they meet.
 Vec3 ContactFriction::relative_velocity(const ContactPair& pair) const {
   const std::array<Vec3, 2> place = meeting_place(pair);
   const auto at = [&](std::uint32_t point, const Vec3& away) {
-    return Vec3(motions_[point].velocity + motions_[point].gradient * away);
+    const PointMotion& motion = states_.cells().motions()[point];
+    return Vec3(motion.velocity + motion.gradient * away);
   };
   const Vec3 of_i = at(pair.i, place[0]);
   return pair.of_plane() ? Vec3(-of_i) : Vec3(at(pair.j, place[1]) - of_i);
@@ -114,71 +80,43 @@ Vec3 ContactFriction::force(std::size_t pair) const {
   return along * now.normal - at_most(kTangential * stiffness * held, largest_tangential(pair));
 }
 
-const PointLoads& ContactFriction::loads(const State& state) {
-  const std::vector<std::uint32_t>& active = states_.active();
-  loads_.reset(list_.points().size());
-  if (active.empty()) return loads_;
-  const bool other = damping_ > 0 && find_motions(state);
-  if (other || rubbed_ != states_.evaluations()) rub(-1, false);
-  for (std::size_t c = 0; c < active.size(); ++c) {
-    const auto& [force, way, share] = rubbing_[c];
-    if (force == Vec3::Zero()) continue;
-    const contact_kernels::PairSides& of = states_.sides()[active[c]];
-    PointLoad& on_i = loads_.of(of.i);
-    on_i.force -= force;
-    if (of.of_plane) continue;
-    on_i.couple -= force * (share * way).transpose();
-    PointLoad& on_j = loads_.of(of.j);
-    on_j.force += force;
-    on_j.couple += force * ((share - 1) * way).transpose();
-  }
-  return loads_;
+// finish_step() finds what the next step asks for, unless an event changes velocities between them.
+void ContactFriction::update(const State& state) {
+  if (rubbed_ == states_.evaluations() &&
+      (!(damping_ > 0) || same_bits(list_.runs(), state.velocity, velocities_)))
+    return;
+  states_.rub(state, damping_);
+  hold(-1, false);
+  take_velocities(state);
 }
 
-// Of what sticks one by one.
-void ContactFriction::rub_chunk(std::size_t begin, std::size_t end, double drift, bool fresh) {
-  std::array<std::uint32_t, kChunk> pairs, places;
-  std::array<double, kChunk> friction;
-  std::array<PairRubbing, kChunk> found;
-  std::size_t count = 0;
-  for (std::size_t c = begin; c < end; ++c) {
-    const std::uint32_t p = states_.active()[c];
+void ContactFriction::take_velocities(const State& state) {
+  rubbed_ = states_.evaluations();
+  velocities_.resize(list_.elements().size());
+  if (damping_ > 0) gather(list_.runs(), state.velocity, velocities_);
+}
+
+void ContactFriction::hold(double drift, bool fresh) {
+  if (!states_.others_act()) return;
+  for (const std::uint32_t p : states_.active()) {
     const ContactPair& pair = list_.pairs()[p];
-    if (!(pair.properties.pull_off > 0) && !memory_[p].sticks()) {
-      places[count] = static_cast<std::uint32_t>(c);
-      friction[count] = pair.properties.friction;
-      pairs[count++] = p;
-      continue;
-    }
+    if (!(pair.properties.pull_off > 0)) continue;
     if (drift >= 0) update_record(p, drift, fresh);
     const std::array<Vec3, 2> place = meeting_place(pair);
-    rubbing_[c] = {force(p), place[0] - place[1], 0};
-    if (rubbing_[c].way != Vec3::Zero())
-      rubbing_[c].share = place[0] == Vec3::Zero() ? 0 : place[1] == Vec3::Zero() ? 1 : 0.5;
+    PairRubbing& rubbing = states_.rubbing(p);
+    rubbing = {force(p), place[0] - place[1], 0};
+    if (rubbing.way != Vec3::Zero())
+      rubbing.share = place[0] == Vec3::Zero() ? 0 : place[1] == Vec3::Zero() ? 1 : 0.5;
   }
-  if (count == 0) return;
-  contact_kernel_table().rub(
-      states_.view(pairs.data(), count),
-      {damping_, drift, reinterpret_cast<const double*>(states_.states().data()),
-       reinterpret_cast<const double*>(motions_.data()), reinterpret_cast<double*>(memory_.data())},
-      friction.data(), reinterpret_cast<double*>(found.data()));
-  for (std::size_t n = 0; n < count; ++n) rubbing_[places[n]] = found[n];
-}
-
-void ContactFriction::rub(double drift, bool fresh) {
-  rubbed_ = states_.evaluations();
-  rubbing_.resize(states_.active().size());
-  motions_.resize(list_.points().size());
-  parallel_chunks(rubbing_.size(), kChunk,
-                  [&](std::size_t begin, std::size_t end) { rub_chunk(begin, end, drift, fresh); });
+  if (drift >= 0) states_.choose_acting();
 }
 
 void ContactFriction::finish_step(const State& state, double drift, bool active) {
   const bool fresh = std::exchange(fresh_, false);
   if (list_.pairs().empty() || !active) return;
   forget_separated();
-  find_motions(state);
-  rub(drift, fresh);
+  hold(drift, fresh);
+  take_velocities(state);
   last_active_ = states_.active();
   last_builds_ = list_.builds();
 }

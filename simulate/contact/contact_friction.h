@@ -20,29 +20,16 @@ namespace flexel::simulate {
 
 constexpr double kTangential = 0.8;  // stiffness of a pair along the surface, of that along the normal
 
-// Of a point in a pair that rubs: m/s; dv/dx of its cell [1/s]. Rows of simulate/kernels/kernel_contact.h, as those
-// of the next one.
-struct alignas(64) PointMotion {
-  Vec3 velocity = Vec3::Zero();
-  Mat3 gradient = Mat3::Zero();
-};
-
-// Of an active pair: N, on j; from i to j [m], of which `share` is where they meet.
-struct alignas(64) PairRubbing {
-  Vec3 force = Vec3::Zero(), way = Vec3::Zero();
-  double share = 0;
-};
-
 class ContactFriction {
  public:
   // All but `damping` [s] outlive this; slip and adhesion are kept in `memory`.
-  ContactFriction(double damping, const ContactSurface& surface, const PairList& list,
-                  const PairStates& states, PairMemory& memory);
+  ContactFriction(double damping, const ContactSurface& surface, const PairList& list, PairStates& states,
+                  PairMemory& memory);
 
-  // The loads in `state`, for which the pairs have been evaluated.
-  [[nodiscard]] const PointLoads& loads(const State& state);
-  // Slip and adhesion after a step of `drift` s that led to `state`, likewise evaluated. `active`: whether
-  // anything dissipates at all.
+  // Brings PairStates::rubbing() to `state`, for which the pairs have been evaluated.
+  void update(const State& state);
+  // After a step of `drift` s that led to `state`, which the pairs have gone through. `active`: whether anything dissipates
+  // at all.
   void finish_step(const State& state, double drift, bool active);
 
   // Of an active pair under pressure: from each of its points where they meet [m]; N/m, of the pair along its
@@ -55,10 +42,9 @@ class ContactFriction {
   void set_fresh(bool fresh) { fresh_ = fresh; }
 
  private:
-  bool find_motions(const State& state);  // whether they are others than those found last
-  // Of the active pairs to rubbing_; with slips brought up to date, where `drift` [s] is not negative.
-  void rub(double drift, bool fresh);
-  void rub_chunk(std::size_t begin, std::size_t end, double drift, bool fresh);
+  // Of what may stick, one by one; with slips and adhesion brought up to date, where `drift` [s] is not negative.
+  void hold(double drift, bool fresh);
+  void take_velocities(const State& state);
   void forget_separated();
   void update_record(std::size_t pair, double drift, bool fresh);
   [[nodiscard]] Vec3 force(std::size_t pair) const;
@@ -69,19 +55,10 @@ class ContactFriction {
   double damping_;
   const ContactSurface& surface_;
   const PairList& list_;
-  const PairStates& states_;
+  PairStates& states_;
   PairMemory& memory_;
-  PointLoads loads_;
-  std::vector<PairRubbing> rubbing_;  // (active pairs)
-  std::uint64_t rubbed_ = 0;          // the evaluation that they are of
-  // (PairList::points()) of those in pairs under pressure or that can stick: for which evaluation of the pairs and
-  // velocities of PairList::elements().
-  std::vector<PointMotion> motions_;
-  std::vector<Vec3> velocities_;
-  std::uint64_t evaluation_ = 0;
-  std::vector<std::uint64_t> point_found_;  // by which find_motions()
-  std::vector<std::uint32_t> wanted_;       // points of the last one
-  std::uint64_t found_ = 0;
+  std::uint64_t rubbed_ = 0;      // the evaluation that rubbing() is of
+  std::vector<Vec3> velocities_;  // (PairList::elements()) likewise
   // Active pairs of the last finish_step(), in the list of this number.
   std::vector<std::uint32_t> last_active_;
   std::uint64_t last_builds_ = 0;

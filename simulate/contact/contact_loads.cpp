@@ -36,20 +36,26 @@ std::array<Vec3, 8> ContactLoads::on_elements(const ContactPoint& point, const P
   return on;
 }
 
-void ContactLoads::add(const State& state, const PairList& list, const PairStates& states,
-                       const PointLoads& loads, std::vector<Vec3>& forces) {
+void ContactLoads::add(const State& state, const PairList& list, const PairStates& states, bool rubbing,
+                       std::vector<Vec3>& forces) {
   static_assert(sizeof(PointLoad) == sizeof(double) * contact_kernels::kLoadRow);
-  if (loads.points().empty()) return;
+  const std::vector<std::uint32_t>&pairs = states.acting(), &points = states.acting_points();
+  if (pairs.empty()) return;
+  loads_.resize(list.points().size());
+  for (const std::uint32_t point : points) loads_[point] = {};
+  auto* loads = reinterpret_cast<double*>(loads_.data());
+  contact_kernel_table().collect(states.view(pairs.data(), pairs.size()),
+                                 rubbing ? nullptr : reinterpret_cast<const double*>(states.states().data()),
+                                 rubbing ? reinterpret_cast<const double*>(states.rubbing().data()) : nullptr,
+                                 loads);
   contact_kernel_table().spread(states.cells().points().data(),
-                                reinterpret_cast<const double*>(states.points().data()),
-                                loads.points().data(), loads.points().size(),
-                                reinterpret_cast<const double*>(loads.loads().data()), forces.data()->data());
+                                reinterpret_cast<const double*>(states.points().data()), points.data(),
+                                points.size(), loads, forces.data()->data());
   if (rigid_loads_.empty()) return;
-  for (std::size_t n = 0; n < loads.points().size(); ++n) {
-    const ContactPoint& point = list.point(loads.points()[n]);
+  for (const std::uint32_t number : points) {
+    const ContactPoint& point = list.point(number);
     if (rigid_load_[point.part] == kNotRigid) continue;
-    const std::array<Vec3, 8> on =
-        on_elements(point, states.points()[loads.points()[n]], loads.loads()[n], states);
+    const std::array<Vec3, 8> on = on_elements(point, states.points()[number], loads_[number], states);
     RigidLoad& rigid = rigid_loads_[rigid_load_[point.part]];
     for (std::uint32_t a = 0; a < point.at.count; ++a) {
       const std::uint32_t e = point.at.elements[a];

@@ -11,33 +11,6 @@ struct alignas(64) PointLoad {
   Mat3 couple = Mat3::Zero();   // N m, sum of force (x) its place from the point
 };
 
-// The loads of one kind of forces in a state; points without any are left out.
-class PointLoads {
- public:
-  // To none, of so many points.
-  void reset(std::size_t points) {
-    if (number_.size() != points) number_.assign(points, kNone);
-    for (const std::uint32_t point : points_) number_[point] = kNone;
-    points_.clear();
-    loads_.clear();
-  }
-  [[nodiscard]] PointLoad& of(std::uint32_t point) {
-    if (number_[point] == kNone) {
-      number_[point] = static_cast<std::uint32_t>(points_.size());
-      points_.push_back(point);
-      loads_.emplace_back();
-    }
-    return loads_[number_[point]];
-  }
-  [[nodiscard]] const std::vector<std::uint32_t>& points() const { return points_; }  // that have any
-  [[nodiscard]] const std::vector<PointLoad>& loads() const { return loads_; }        // (points())
-
- private:
-  static constexpr std::uint32_t kNone = 0xffffffff;
-  std::vector<std::uint32_t> number_, points_;
-  std::vector<PointLoad> loads_;
-};
-
 // Resultant on a rigid part: N, and N m about the origin or its centre of mass.
 struct RigidLoad {
   std::uint32_t part = 0;
@@ -50,8 +23,9 @@ class ContactLoads {
   ContactLoads(const ContactSurface& surface, const std::vector<std::uint8_t>& parts);
 
   void clear();
-  // Adds the `loads` of PairList::points() to `forces` (elements x 3) N and to the resultants.
-  void add(const State& state, const PairList& list, const PairStates& states, const PointLoads& loads,
+  // Of the acting pairs, along their normals or, `rubbing`, of friction and damping: to `forces` (elements x 3) N and to
+  // the resultants.
+  void add(const State& state, const PairList& list, const PairStates& states, bool rubbing,
            std::vector<Vec3>& forces);
 
   // Since clear(), about the origin.
@@ -65,6 +39,7 @@ class ContactLoads {
 
   static constexpr std::size_t kNotRigid = SIZE_MAX;
   const ContactSurface& surface_;
+  std::vector<PointLoad> loads_;         // (PairList::points())
   std::vector<RigidLoad> rigid_loads_;   // of free rigid parts that can touch
   std::vector<std::size_t> rigid_load_;  // (parts) in rigid_loads_, or kNotRigid
 };

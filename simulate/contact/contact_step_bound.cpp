@@ -99,7 +99,8 @@ bool ContactStepBound::moves_too_far(const State& state) const {
 }
 
 bool ContactStepBound::is_exceeded() {
-  if (checked()) return hardening(kHardeningAhead) > hardening_;
+  static_assert(kHardeningAhead > contact_kernels::kStiffening);
+  if (checked()) return states_.stiffens() && hardening(kHardeningAhead) > hardening_;
   checked_builds_ = list_.builds();
   return damped(linear() + hardening(1), settings_.damping) > 1.001 * bound_;
 }

@@ -64,26 +64,15 @@ bool Contacts::act(const State& state) {
 void Contacts::add_forces(const State& state, std::vector<Vec3>& forces) {
   update(state);
   loads_.clear();
-  point_loads_.reset(list_.points().size());
-  for (const std::uint32_t p : states_.active()) {
-    const PairState& now = states_[p];
-    if (!(now.pressure > 0)) continue;
-    const contact_kernels::PairSides& of = states_.sides()[p];
-    PointLoad& on_i = point_loads_.of(of.i);
-    on_i.force -= now.force;
-    on_i.turning += now.turning[0];
-    if (of.of_plane) continue;
-    PointLoad& on_j = point_loads_.of(of.j);
-    on_j.force += now.force;
-    on_j.turning += now.turning[1];
-  }
-  loads_.add(state, list_, states_, point_loads_, forces);
+  loads_.add(state, list_, states_, false, forces);
 }
 
 void Contacts::add_dissipative_forces(const State& state, std::vector<Vec3>& forces) {
   if (stepping_) return implicit_.add_forces(state, forces);
   update(state);
-  loads_.add(state, list_, states_, friction_.loads(state), forces);
+  if (states_.acting().empty()) return;
+  friction_.update(state);
+  loads_.add(state, list_, states_, true, forces);
 }
 
 std::string Contacts::refuses_implicit_steps() const {
@@ -164,14 +153,15 @@ void Contacts::end_implicit_step(const State& state) {
 // Without pairs nothing happens in a step; whether there are is asked before the next one.
 void Contacts::finish_step(const State& state, double drift) {
   is_current_ = false;
+  went_through_ = true;
   if (list_.built() && list_.pairs().empty()) return;
-  update(state);
-  states_.finish_step(state, drift);
+  update_list(state, false);
+  states_.go_through(state, drift, dissipate(), settings_.damping);
 }
 
 void Contacts::finish_losses(const State& state, double drift) {
-  is_current_ = false;
-  if (!list_.built() || !list_.pairs().empty()) update(state);
+  if (!went_through_) finish_step(state, drift);
+  went_through_ = false;
   friction_.finish_step(state, drift, dissipate());
 }
 

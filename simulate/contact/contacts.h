@@ -103,11 +103,11 @@ class Contacts {
   ContactStepBound bound_;
   ContactLoads loads_;
   ImplicitContact implicit_;
-  PointLoads point_loads_;        // of add_forces()
   bool stepping_ = false;         // within an implicit step
   double stored_ = 0;             // J, as it began
   double numerical_ = 0;          // J, of Energies
   std::uint64_t coupled_at_ = 0;  // the list that take_recoupled() has seen
+  bool went_through_ = false;     // finish_step() of the step that finish_losses() is asked for
   bool is_current_ = false;       // list and states, for the displacements of the last needs_step_recheck()
 };
 

@@ -1,6 +1,10 @@
 // Sums run in the order in which Eigen's do, so that a pair or point that is looked at by itself has the same bits.
 #include "simulate/kernels/kernel_contact.h"
 
+#ifdef __AVX__
+#include <immintrin.h>
+#endif
+
 #include "base/simd.h"
 
 #ifndef FLEXEL_ISA
@@ -72,11 +76,10 @@ FLEXEL_INLINE Lanes bits_of(const LaneMask& flags) {
   return made;
 }
 
-// Of a bool in a row, whose other bytes are anything.
-FLEXEL_INLINE LaneMask is_flagged(const Lanes& value) {
-  LaneMask bits;
-  __builtin_memcpy(&bits, &value, sizeof bits);
-  return (bits & 0xff) != 0;
+FLEXEL_INLINE bool any(const LaneMask& mask) {
+  long long bits = 0;
+  for (std::size_t l = 0; l < kLanes; ++l) bits |= mask[l];
+  return bits != 0;
 }
 
 // Rows to columns and back.
@@ -118,7 +121,11 @@ FLEXEL_INLINE Block block_of(const std::uint32_t* which, std::size_t begin, std:
 }
 
 FLEXEL_INLINE FourDoubles load_three(const double* from) {
+#ifdef __AVX__
+  return _mm256_maskload_pd(from, __m256i{-1, -1, -1, 0});
+#else
   return FourDoubles{from[0], from[1], from[2], 0};
+#endif
 }
 
 FLEXEL_INLINE void store_three(double* to, const FourDoubles& value) {
@@ -126,6 +133,14 @@ FLEXEL_INLINE void store_three(double* to, const FourDoubles& value) {
   const TwoDoubles two = {value[0], value[1]};
   __builtin_memcpy(to, &two, sizeof two);
   to[2] = value[2];
+}
+
+// What store_three() has written a moment ago: in its two pieces it need not wait for the cache.
+FLEXEL_INLINE FourDoubles load_stored_three(const double* from) {
+  using TwoDoubles = double __attribute__((vector_size(16)));
+  TwoDoubles two;
+  __builtin_memcpy(&two, from, sizeof two);
+  return FourDoubles{two[0], two[1], from[2], 0};
 }
 
 FLEXEL_INLINE void store_four(double* to, const FourDoubles& value) {
@@ -296,6 +311,7 @@ void place(const CarriedPoint* points, const std::uint32_t* which, std::size_t c
 struct Sides {
   Three position[2], normal[2];
   Lanes own_plane[2], radius[2];
+  LaneMask plane;
 };
 
 FLEXEL_INLINE void read_sides(const PairView& pairs, const Block& block, Sides& made) {
@@ -314,6 +330,7 @@ FLEXEL_INLINE void read_sides(const PairView& pairs, const Block& block, Sides& 
   made.position[1] = {j[0], j[1], j[2]};
   made.normal[1] = {j[3], j[4], j[5]};
   const LaneMask plane = planes != 0;  // the foot on it; its normal is the exact one
+  made.plane = plane;
   const Lanes height = dot(made.position[0] - made.position[1], made.normal[1]);
   made.position[1] = pick(plane, made.position[0] - height * made.normal[1], made.position[1]);
   made.own_plane[0] = pick(plane, Lanes{}, i[6]);
@@ -329,10 +346,34 @@ struct Constants {
 
 FLEXEL_INLINE Constants read_constants(const PairView& pairs, const Block& block) {
   Lanes c[8];
-  for (std::size_t l = 0; l < kLanes; ++l)
-    c[l] = load(reinterpret_cast<const double*>(pairs.constants + pairs.stride * block.at[l]));
+  for (std::size_t l = 0; l < kLanes; ++l) c[l] = load(pairs.pairs + kPairRow * block.at[l]);
   transpose(c);
   return {c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]};
+}
+
+// What follows them in a ContactPair.
+struct Surfaces {
+  Lanes friction, pull_off, farthest_soft, rest_overlap;
+};
+
+FLEXEL_INLINE Surfaces read_surfaces(const PairView& pairs, const Block& block) {
+  Lanes c[8];
+  for (std::size_t l = 0; l < kLanes; ++l) c[l] = load(pairs.pairs + kPairRow * block.at[l] + kConstantsRow);
+  transpose(c);
+  return {c[0], c[1], c[2], c[3]};
+}
+
+// Of PairRecord.
+struct Records {
+  Three slip;
+  Lanes soft;
+};
+
+FLEXEL_INLINE Records read_records(const double* records, const Block& block) {
+  Lanes c[8];
+  for (std::size_t l = 0; l < kLanes; ++l) c[l] = load(records + kRecordRow * block.at[l]);
+  transpose(c);
+  return {{c[1], c[2], c[3]}, c[7]};
 }
 
 struct Smooth {
@@ -340,18 +381,20 @@ struct Smooth {
 };
 
 FLEXEL_INLINE Smooth kernel(const Lanes& squared, const Lanes& width) {
-  const Lanes q = 1 - squared / (width * width);
-  const Lanes scale = 3 / (3.14159265358979323846 * width * width);
+  const Lanes per_square = 1 / (width * width);
+  const Lanes q = 1 - squared * per_square;
+  const Lanes scale = (3 / 3.14159265358979323846) * per_square;
   const LaneMask flat = ~(width > 0), none = ~flat & ~(q > 0);
   return {pick(flat, Lanes{} + 1, pick(none, Lanes{}, scale * q * q)),
-          pick(flat | none, Lanes{}, -2 * scale * q / (width * width))};
+          pick(flat | none, Lanes{}, -2 * scale * q * per_square)};
 }
 
 FLEXEL_INLINE Smooth ramp(const Lanes& at, const Lanes& from, const Lanes& to) {
-  const Lanes s = (at - from) / (to - from);
+  const Lanes per_length = 1 / (to - from);
+  const Lanes s = (at - from) * per_length;
   const LaneMask below = s <= 0, above = s >= 1;
   return {pick(below, Lanes{}, pick(above, Lanes{} + 1, s * s * (3 - 2 * s))),
-          pick(below | above, Lanes{}, 6 * s * (1 - s) / (to - from))};
+          pick(below | above, Lanes{}, 6 * s * (1 - s) * per_length)};
 }
 
 // Columns of PairState.
@@ -369,14 +412,14 @@ FLEXEL_INLINE void press(Evaluated& now, const Sides& side, const Lanes& soft, c
   const Lanes hardening = pick(inside, depth * depth / (hard * hard), Lanes{});
   Lanes energy = pick(inside, 0.25 * hardening * depth * depth, Lanes{});
   Lanes pressure = pick(inside, hardening * depth, Lanes{});
-  energy +=
-      pick(touches,
-           pick(softly, delta * delta * delta / (6 * soft), 0.5 * delta * (delta - soft) + soft * soft / 6),
-           Lanes{});
-  pressure += pick(touches, pick(softly, delta * delta / (2 * soft), delta - 0.5 * soft), Lanes{});
+  const Lanes share = delta / soft;
+  energy += pick(
+      touches,
+      pick(softly, (1.0 / 6) * delta * delta * share, 0.5 * delta * (delta - soft) + (1.0 / 6) * soft * soft),
+      Lanes{});
+  pressure += pick(touches, pick(softly, 0.5 * delta * share, delta - 0.5 * soft), Lanes{});
   const LaneMask presses = pressure > 0;
   now.stiffness = now.weight * pick(inside, 1 + 3 * hardening, Lanes{} + 1);
-  const Lanes share = delta / soft;
   now.share = pick(presses, pick(share < 0, Lanes{}, pick(share > 1, Lanes{} + 1, share)), Lanes{});
   energy = pick(presses, energy, Lanes{});
   now.energy = now.weight * energy;
@@ -407,7 +450,8 @@ FLEXEL_INLINE void evaluate_block(const Sides& side, const Constants& k, const L
   const LaneMask balls = (side.radius[0] > 0) & (side.radius[1] > 0);
   now.near &= balls | (length > 0);
   const Lanes distance = dot(d, d);
-  now.normal = pick(balls, pick(distance > 0, d / square_root(distance), d), b / length);
+  now.normal = (1 / length) * b;
+  if (any(balls)) now.normal = pick(balls, pick(distance > 0, d / square_root(distance), d), now.normal);
   now.along = dot(d, now.normal);
   now.gap = now.along - side.radius[0] - side.radius[1] + allowed;
   now.offset = pick(balls, Three{Lanes{}, Lanes{}, Lanes{}}, d - now.along * now.normal);
@@ -443,19 +487,180 @@ FLEXEL_INLINE void write_states(Evaluated& now, const Block& block, double* stat
   }
 }
 
-void evaluate(const PairView& pairs, const double* allowed, const double* soft, double* states) {
+// PointMotion of one side of eight pairs.
+struct Motion {
+  Three velocity;
+  Lanes gradient[9];
+};
+
+FLEXEL_INLINE Motion read_motion(const double* motions, const std::uint32_t at[kLanes]) {
+  Lanes a[8], b[8];
+  for (std::size_t l = 0; l < kLanes; ++l) {
+    a[l] = load(motions + kMotionRow * at[l]);
+    b[l] = load(motions + kMotionRow * at[l] + 8);
+  }
+  transpose(a);
+  transpose(b);
+  return {{a[0], a[1], a[2]}, {a[3], a[4], a[5], a[6], a[7], b[0], b[1], b[2], b[3]}};
+}
+
+FLEXEL_INLINE Three velocity_at(const Motion& of, const Three& away) {
+  const Lanes* g = of.gradient;
+  return {of.velocity.x + (g[0] * away.x + g[3] * away.y + g[6] * away.z),
+          of.velocity.y + (g[1] * away.x + g[4] * away.y + g[7] * away.z),
+          of.velocity.z + row_sum(2, g[2] * away.x, g[5] * away.y, g[8] * away.z)};
+}
+
+// Both sides of eight pairs, and where they meet, from each of them: share d, (share - 1) d; on a plane at the point.
+struct Meeting {
+  Motion of[2];
+  Three d;
+  Lanes share;
+  LaneMask plane;
+};
+
+// A ball meets at its centre, which alone can carry a force; a shapeless point likewise. Both have no normal.
+FLEXEL_INLINE void read_meeting(const PairView& pairs, const Block& block, const Sides& side,
+                                const double* motions, Meeting& made) {
+  std::uint32_t i[kLanes], j[kLanes];
+  for (std::size_t l = 0; l < kLanes; ++l) {
+    const PairSides& of = pairs.sides[block.at[l]];
+    i[l] = of.i;
+    j[l] = of.of_plane ? of.i : of.j;
+  }
+  const Three zero = {Lanes{}, Lanes{}, Lanes{}};
+  made.of[0] = read_motion(motions, i);
+  made.of[1] = read_motion(motions, j);
+  made.plane = side.plane;
+  made.d = pick(made.plane, zero, side.position[1] - side.position[0]);
+  const LaneMask centred_i = is_zero(side.normal[0]), centred_j = is_zero(side.normal[1]);
+  made.share = pick(centred_i == centred_j, Lanes{} + 0.5, pick(centred_i, Lanes{}, Lanes{} + 1));
+}
+
+// m/s, of j against i.
+FLEXEL_INLINE Three between(const LaneMask& plane, const Three& of_i, const Three& of_j) {
+  return pick(plane, Three{-of_i.x, -of_i.y, -of_i.z}, of_j - of_i);
+}
+
+constexpr double kSoftSteps = 2;      // in which an impact goes through the soft part of the contact law
+constexpr double kHardening = 0.001;  // a step, of what rests: the share of its extra softness that goes
+constexpr double kHardened = 1.01;    // of the least softness, at which that is over
+
+// m, of the soft part of pairs in the steps to come, or 0: that of the law. A pair that will press within kSoftSteps
+// gets one as wide as its way in them, but does not press where it is. One that is pressed keeps its own, for the
+// energy it has stored is of that, and hardens slowly as it rests. It depends on the present state alone, for which
+// pairs sleep a run that goes on from a checkpoint need not know.
+FLEXEL_INLINE Lanes softness_after(const Evaluated& now, const LaneMask& presses, const Constants& k,
+                                   const Lanes& soft, const Lanes& farthest, const Lanes& nearing,
+                                   double drift) {
+  const Lanes hardened = soft - kHardening * (soft - k.soft);
+  const Lanes way = (kSoftSteps * drift) * nearing;
+  const Lanes chosen = smaller(way, smaller(k.soft + 2 * larger(now.gap, Lanes{}), farthest));
+  return pick(presses, pick(hardened < kHardened * k.soft, Lanes{}, hardened),
+              pick(now.near & ~now.deep & ~(now.gap > way) & (chosen > k.soft), chosen, Lanes{}));
+}
+
+// To the softness after the step. Returns what that takes [J].
+FLEXEL_INLINE Lanes soften(const Sides& side, const Constants& k, const Lanes& before, const Lanes& after,
+                           Evaluated& now) {
+  const LaneMask changed = now.near & ~now.deep & (after != before);
+  if (!any(changed)) return Lanes{};
+  const Lanes energy = now.energy;
+  const LaneMask softens = after > k.soft;
+  press(now, side, pick(softens, after, k.soft), k.hard, pick(softens, 0.5 * (after - k.soft), k.ahead));
+  return pick(changed, energy - now.energy, Lanes{});
+}
+
+FLEXEL_INLINE Three at_most(const Three& value, const Lanes& most) {
+  const Lanes norm = square_root(dot(value, value));
+  return pick(norm > most, (most / norm) * value, value);
+}
+
+constexpr double kTangential = 0.8;  // as in simulate/contact/contact_friction.h
+
+// Friction and damping; slips in `record` are brought up to date.
+FLEXEL_INLINE Three rub(const Evaluated& now, const LaneMask& presses, const Meeting& meeting,
+                        const Lanes& friction, const PairStep& step, Three& slip) {
+  const Three zero = {Lanes{}, Lanes{}, Lanes{}};
+  Three velocity = between(meeting.plane, velocity_at(meeting.of[0], meeting.share * meeting.d),
+                           velocity_at(meeting.of[1], (meeting.share - 1) * meeting.d));
+  const Lanes secant = larger(pick(now.share < 1, Lanes{}, now.pressure / -now.gap), now.weight);
+  const Lanes most = friction * now.pressure;
+  if (step.drift >= 0) {
+    slip = slip + (Lanes{} + step.drift) * velocity;
+    slip = slip - dot(slip, now.normal) * now.normal;
+    slip = pick(presses & (friction > 0), at_most(slip, most / (kTangential * secant)), zero);
+  }
+  if (!(step.damping > 0)) velocity = zero;
+  const Lanes separating = dot(velocity, now.normal);
+  const Lanes along = larger(-step.damping * now.stiffness * now.share * separating, -now.pressure);
+  const Three held = slip + (Lanes{} + step.damping) * (velocity - separating * now.normal);
+  return pick(presses, along * now.normal - at_most((kTangential * secant) * held, most), zero);
+}
+
+FLEXEL_INLINE void write_rubbing(const Three& force, const Meeting& meeting, const Block& block,
+                                 double* rubbing) {
+  Lanes rows[8] = {force.x, force.y, force.z, meeting.d.x, meeting.d.y, meeting.d.z, meeting.share, Lanes{}};
+  transpose(rows);
+  for (std::size_t l = 0; l < block.count; ++l) store(rubbing + kRubbingRow * block.at[l], rows[l]);
+}
+
+// Of pairs that do not stick.
+FLEXEL_INLINE void write_slips(const Three& slip, const Lanes& pull_off, const Block& block,
+                               double* records) {
+  Lanes rows[8] = {slip.x, slip.y, slip.z, Lanes{}, Lanes{}, Lanes{}, Lanes{}, Lanes{}};
+  transpose(rows);
+  for (std::size_t l = 0; l < block.count; ++l)
+    if (!(pull_off[l] > 0))
+      __builtin_memcpy(records + kRecordRow * block.at[l] + 1, &rows[l], 3 * sizeof(double));
+}
+
+// Of the block from `begin` on, whose states are `now`. Returns the energy that is lost [J].
+FLEXEL_INLINE Lanes go_through(const PairView& pairs, const PairStep& step, const Block& block,
+                               const Sides& side, const Constants& k, const Surfaces& surfaces,
+                               Records& record, Evaluated& now) {
+  Meeting meeting;
+  read_meeting(pairs, block, side, step.motions, meeting);
+  Lanes lost = {};
+  if (step.drift >= 0) {
+    const Three nearing = between(meeting.plane, meeting.of[0].velocity, meeting.of[1].velocity);
+    const LaneMask presses = now.near & ~now.deep & (now.pressure > 0);
+    const Lanes soft = softness_after(now, presses, k, record.soft, surfaces.farthest_soft,
+                                      -dot(nearing, now.normal), step.drift);
+    lost = soften(side, k, record.soft, soft, now);
+    for (std::size_t l = 0; l < block.count; ++l) step.records[kRecordRow * block.at[l] + 7] = soft[l];
+  }
+  if (!step.rubbing) return lost;
+  const LaneMask presses = now.near & ~now.deep & (now.pressure > 0);
+  write_rubbing(rub(now, presses, meeting, surfaces.friction, step, record.slip), meeting, block,
+                step.rubbing);
+  if (step.drift >= 0) write_slips(record.slip, surfaces.pull_off, block, step.records);
+  return lost;
+}
+
+void evaluate(const PairView& pairs, const double* allowed, const PairStep& step, double* states) {
   for (std::size_t begin = 0; begin < pairs.count; begin += kLanes) {
     const Block block = block_of(pairs.which, begin, pairs.count);
-    Lanes permitted = {}, wider = {};
-    for (std::size_t l = 0; l < block.count; ++l) {
-      permitted[l] = allowed[begin + l];
-      wider[l] = soft[begin + l];
-    }
+    const Surfaces surfaces = read_surfaces(pairs, block);
+    Records record = read_records(step.records, block);
+    Lanes permitted = surfaces.rest_overlap;
+    for (std::size_t l = 0; allowed && l < block.count; ++l) permitted[l] = allowed[begin + l];
     Sides side;
     read_sides(pairs, block, side);
+    const Constants k = read_constants(pairs, block);
     Evaluated now;
-    evaluate_block(side, read_constants(pairs, block), permitted, wider, now);
+    evaluate_block(side, k, permitted, record.soft, now);
+    Lanes lost = {};
+    if (step.motions) lost = go_through(pairs, step, block, side, k, surfaces, record, now);
     write_states(now, block, states);
+    const LaneMask touches = now.near & ~now.deep;
+    const LaneMask marks = (touches & (now.pressure > 0) & kPresses) |
+                           (touches & (now.stiffness > kStiffening * now.weight) & kStiffens) |
+                           ((lost != 0) & kHardens);
+    for (std::size_t l = 0; l < block.count; ++l) {
+      step.marks[begin + l] = static_cast<std::uint8_t>(marks[l]);
+      step.lost[begin + l] = lost[l];
+    }
   }
 }
 
@@ -470,16 +675,15 @@ struct Rates {
 };
 
 FLEXEL_INLINE Rates read_rates(const PairView& pairs, const Block& block, const Sides& side) {
-  Lanes i = {}, j = {}, planes = {};
+  Lanes i = {}, j = {};
   for (std::size_t l = 0; l < kLanes; ++l) {
     const PairSides& of = pairs.sides[block.at[l]];
     i[l] = pairs.points[kPointRow * of.i + kNormalRate];
     j[l] = of.of_plane ? 0 : pairs.points[kPointRow * of.j + kNormalRate];
-    planes[l] = of.of_plane;
   }
   return {larger(i, j),
           larger(pick(side.own_plane[0] > 0, i, Lanes{}), pick(side.own_plane[1] > 0, j, Lanes{})),
-          planes != 0};
+          side.plane};
 }
 
 struct Safe {
@@ -587,124 +791,40 @@ void move(const CarriedPoint* points, const std::uint32_t* which, std::size_t co
   }
 }
 
-// Where two points meet, from each of them: share d, (share - 1) d; on a plane at the point.
-struct Meeting {
-  Three d;
-  Lanes share;
-  LaneMask plane;
-};
-
-FLEXEL_INLINE Meeting read_meeting(const PairView& pairs, const Block& block) {
-  Lanes i[8], j[8], planes = {}, shapeless_i = {}, shapeless_j = {};
-  for (std::size_t l = 0; l < kLanes; ++l) {
-    const PairSides& of = pairs.sides[block.at[l]];
-    const double *row_i = pairs.points + kPointRow * of.i,
-                 *row_j = of.of_plane ? row_i : pairs.points + kPointRow * of.j;
-    i[l] = load(row_i);
-    j[l] = load(row_j);
-    planes[l] = of.of_plane;
-    shapeless_i[l] = row_i[kShapeless];
-    shapeless_j[l] = row_j[kShapeless];
-  }
-  transpose(i);
-  transpose(j);
-  const LaneMask centred_i = (i[7] > 0) | is_flagged(shapeless_i),
-                 centred_j = (j[7] > 0) | is_flagged(shapeless_j);
-  const Three zero = {Lanes{}, Lanes{}, Lanes{}};
-  const LaneMask plane = planes != 0;
-  return {pick(plane, zero, Three{j[0] - i[0], j[1] - i[1], j[2] - i[2]}),
-          pick(centred_i == centred_j, Lanes{} + 0.5, pick(centred_i, Lanes{}, Lanes{} + 1)), plane};
-}
-
-FLEXEL_INLINE Three velocity_at(const double* motions, const std::uint32_t at[kLanes], const Three& away) {
-  Lanes a[8], b[8];
-  for (std::size_t l = 0; l < kLanes; ++l) {
-    a[l] = load(motions + kMotionRow * at[l]);
-    b[l] = load(motions + kMotionRow * at[l] + 8);
-  }
-  transpose(a);
-  transpose(b);
-  return {a[0] + (a[3] * away.x + a[6] * away.y + b[1] * away.z),
-          a[1] + (a[4] * away.x + a[7] * away.y + b[2] * away.z),
-          a[2] + row_sum(2, a[5] * away.x, b[0] * away.y, b[3] * away.z)};
-}
-
-// m/s, of j against i where they meet.
-FLEXEL_INLINE Three relative_velocity(const PairView& pairs, const Block& block, const Meeting& meeting,
-                                      const double* motions) {
-  std::uint32_t i[kLanes], j[kLanes];
-  for (std::size_t l = 0; l < kLanes; ++l) {
-    const PairSides& of = pairs.sides[block.at[l]];
-    i[l] = of.i;
-    j[l] = of.of_plane ? of.i : of.j;
-  }
-  const Three of_i = velocity_at(motions, i, meeting.share * meeting.d);
-  const Three of_j = velocity_at(motions, j, (meeting.share - 1) * meeting.d);
-  return pick(meeting.plane, Three{-of_i.x, -of_i.y, -of_i.z}, of_j - of_i);
-}
-
-FLEXEL_INLINE Three at_most(const Three& value, const Lanes& most) {
-  const Lanes norm = square_root(dot(value, value));
-  return pick(norm > most, (most / norm) * value, value);
-}
-
-// What friction needs of the states and records of pairs.
-struct RubbingColumns {
-  Three normal, slip;
-  Lanes gap, weight, pressure, stiffness, share;
-};
-
-FLEXEL_INLINE RubbingColumns read_rubbing(const Block& block, const double* states, const double* records) {
-  Lanes a[8], b[8], c[8];
-  for (std::size_t l = 0; l < kLanes; ++l) {
-    a[l] = load(states + kStateRow * block.at[l] + 8);
-    b[l] = load(states + kStateRow * block.at[l] + 16);
-    c[l] = load(records + kRecordRow * block.at[l]);
-  }
-  transpose(a);
-  transpose(b);
-  transpose(c);
-  return {{a[1], a[2], a[3]}, {c[1], c[2], c[3]}, a[7], b[0], b[2], b[3], b[4]};
-}
-
-// As in contact_friction.h.
-constexpr double kTangential = 0.8;
-
-void rub(const PairView& pairs, const Rubbing& with, const double* friction, double* rubbing) {
-  for (std::size_t begin = 0; begin < pairs.count; begin += kLanes) {
-    const Block block = block_of(pairs.which, begin, pairs.count);
-    Lanes mu = {};
-    for (std::size_t l = 0; l < block.count; ++l) mu[l] = friction[begin + l];
-    const RubbingColumns now = read_rubbing(block, with.states, with.records);
-    const Meeting meeting = read_meeting(pairs, block);
-    Three velocity = {Lanes{}, Lanes{}, Lanes{}}, slip = now.slip;
-    if (with.damping > 0 || with.drift >= 0)
-      velocity = relative_velocity(pairs, block, meeting, with.motions);
-    const Lanes secant = larger(pick(now.share < 1, Lanes{}, now.pressure / -now.gap), now.weight);
-    const Lanes most = mu * now.pressure;
-    const Three zero = {Lanes{}, Lanes{}, Lanes{}};
-    const LaneMask presses = now.pressure > 0;
-    if (with.drift >= 0) {
-      slip = slip + (Lanes{} + with.drift) * velocity;
-      slip = slip - dot(slip, now.normal) * now.normal;
-      slip = pick(presses & (mu > 0), at_most(slip, most / (kTangential * secant)), zero);
+// ContactLoads: the load of a pair on its points, of which the second half is the rest of the couple.
+void collect(const PairView& pairs, const double* states, const double* rubbing, double* loads) {
+  constexpr LaneBits on_j = {0,  1,  2, 11,
+                             12, 13, 7, 7};  // force, and from the third place on the second turning
+  constexpr LaneBits force_0 = {0, 1, 2, 7, 7, 7, 0, 1}, way_0 = {7, 7, 7, 7, 7, 7, 3, 3};
+  constexpr LaneBits force_1 = {2, 0, 1, 2, 0, 1, 2, 7}, way_1 = {3, 4, 4, 4, 5, 5, 5, 7};
+  constexpr Lanes against = {-1, -1, -1, 1, 1, 1, 0, 0}, along = {1, 1, 1, 1, 1, 1, 0, 0};
+  constexpr Lanes back = {-1, -1, -1, 0, 0, 0, 0, 0}, forth = {1, 1, 1, 0, 0, 0, 0, 0};
+  for (std::size_t n = 0; n < pairs.count; ++n) {
+    const std::size_t p = pairs.which[n];
+    const PairSides& of = pairs.sides[p];
+    Lanes i[2] = {}, j[2] = {};
+    if (states) {
+      const Lanes row = load(states + kStateRow * p);
+      i[0] = against * row;
+      j[0] = along * shuffle(row, load(states + kStateRow * p + 3), on_j);
     }
-    if (!(with.damping > 0)) velocity = zero;
-    const Lanes separating = dot(velocity, now.normal);
-    const Lanes along = larger(-with.damping * now.stiffness * now.share * separating, -now.pressure);
-    const Three held = slip + (Lanes{} + with.damping) * (velocity - separating * now.normal);
-    const Three force =
-        pick(presses, along * now.normal - at_most((kTangential * secant) * held, most), zero);
-    Lanes rows[8] = {force.x,     force.y,     force.z,       meeting.d.x,
-                     meeting.d.y, meeting.d.z, meeting.share, Lanes{}};
-    Lanes slips[8] = {slip.x, slip.y, slip.z, Lanes{}, Lanes{}, Lanes{}, Lanes{}, Lanes{}};
-    transpose(rows);
-    transpose(slips);
-    for (std::size_t l = 0; l < block.count; ++l) {
-      store(rubbing + kRubbingRow * (begin + l), rows[l]);
-      if (with.drift >= 0)
-        __builtin_memcpy(with.records + kRecordRow * block.at[l] + 1, &slips[l], 3 * sizeof(double));
+    if (rubbing) {
+      const Lanes row = load(rubbing + kRubbingRow * p);
+      const Lanes to_i = Lanes{} - row[6], to_j = Lanes{} + (row[6] - 1);
+      const Lanes force[2] = {shuffle(row, row, force_0), shuffle(row, row, force_1)};
+      const Lanes way[2] = {shuffle(row, row, way_0), shuffle(row, row, way_1)};
+      i[0] += force[0] * (back + to_i * way[0]);
+      i[1] += force[1] * (to_i * way[1]);
+      j[0] += force[0] * (forth + to_j * way[0]);
+      j[1] += force[1] * (to_j * way[1]);
     }
+    const auto add = [&](std::uint32_t point, const Lanes* load_of) {
+      double* to = loads + kLoadRow * point;
+      store(to, load(to) + load_of[0]);
+      if (rubbing) store(to + 8, load(to + 8) + load_of[1]);
+    };
+    add(of.i, i);
+    if (!of.of_plane) add(of.j, j);
   }
 }
 
@@ -723,7 +843,7 @@ FLEXEL_INLINE void add_to_elements(const CarriedPoint& point, const double* row,
   }
   for (std::uint32_t a = 0; a < point.count; ++a) {
     double* to = forces + 3 * std::size_t{point.elements[a]};
-    store_three(to, load_three(to) + on[a]);
+    store_three(to, load_stored_three(to) + on[a]);
   }
 }
 
@@ -733,7 +853,7 @@ void spread(const CarriedPoint* points, const double* states, const std::uint32_
     const Block block = block_of(which, begin, count);
     Lanes a[8], b[8], c[8];
     for (std::size_t l = 0; l < kLanes; ++l) {
-      const double* row = loads + kLoadRow * (begin + (l < block.count ? l : block.count - 1));
+      const double* row = loads + kLoadRow * block.at[l];
       a[l] = load(row);
       b[l] = load(row + 8);
       c[l] = load(states + kPointRow * block.at[l]);
@@ -782,7 +902,7 @@ void spread(const CarriedPoint* points, const double* states, const std::uint32_
 #define FLEXEL_TABLE(isa) FLEXEL_JOIN(contacts_, isa)
 
 const ContactTable& FLEXEL_TABLE(FLEXEL_ISA)() {
-  static constexpr ContactTable table = {&place, &look, &evaluate, &move, &rub, &spread};
+  static constexpr ContactTable table = {&place, &look, &evaluate, &move, &collect, &spread};
   return table;
 }
 

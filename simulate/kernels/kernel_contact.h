@@ -27,7 +27,8 @@ struct alignas(64) CarriedPoint {
 constexpr std::size_t kPointRow = 24;  // PointState
 constexpr std::size_t kSideRow = 8;    // ContactSide: position, normal, own_plane, radius
 constexpr std::size_t kInverse = 8, kShapeless = 17, kNormalRate = 18;
-constexpr std::size_t kConstantsRow = 8;  // PairConstants
+constexpr std::size_t kConstantsRow = 8;  // PairConstants, with which a ContactPair begins
+constexpr std::size_t kPairRow = 16;      // ContactPair
 constexpr std::size_t kStateRow = 32;     // PairState
 constexpr std::size_t kRecordRow = 8;     // PairRecord
 constexpr std::size_t kMotionRow = 16;    // PointMotion
@@ -40,14 +41,12 @@ struct PairSides {
   std::uint32_t of_plane;
 };
 
-// Pairs for a kernel: `which` [count] numbers of pairs, and by these numbers `sides` and the rows of their constants,
-// `stride` bytes apart.
+// Pairs for a kernel: `which` [count] numbers of pairs, and by these numbers `sides` and the rows of ContactPair.
 struct PairView {
   const std::uint32_t* which;
   std::size_t count;
   const PairSides* sides;
-  const char* constants;
-  std::size_t stride;
+  const double* pairs;   // rows
   const double* points;  // rows
   const double* planes;  // rows of kSideRow
 };
@@ -59,27 +58,33 @@ using PlacePoints = void (*)(const CarriedPoint* points, const std::uint32_t* wh
 // certain, beyond the kernel or turned away; `pressed` [m]: the gap at which it begins to press (count).
 using LookAtPairs = void (*)(const PairView& pairs, const double* pressed, double* path, double* turn,
                              std::uint8_t* near);
-// pair_state() of PairView::which, to their rows of `states`; `allowed`, `soft` [m] (count).
-using EvaluatePairs = void (*)(const PairView& pairs, const double* allowed, const double* soft,
+// What is remembered of pairs, by their numbers, and what they go through beside being evaluated: nothing without
+// `motions`. A step of `drift` s, or none where that is negative, which leaves slips and softness as they are; friction and
+// damping of those that do not stick, where there is `rubbing`.
+struct PairStep {
+  double* records = nullptr;        // rows
+  double damping = 0, drift = -1;   // s
+  const double* motions = nullptr;  // rows, by numbers of points
+  double* rubbing = nullptr;        // rows
+  double* lost = nullptr;           // (PairView::count) J, by hardening
+  std::uint8_t* marks = nullptr;    // (PairView::count) sums of the following
+};
+constexpr std::uint8_t kPresses = 1, kStiffens = 2, kHardens = 4;
+constexpr double kStiffening = 1.25;  // times as stiff as in the linear range, from which kStiffens
+
+// pair_state() of PairView::which, to their rows of `states`; `allowed` [m] (count), or nothing: ContactPair::rest_overlap.
+using EvaluatePairs = void (*)(const PairView& pairs, const double* allowed, const PairStep& step,
                                double* states);
 
 // PointMotion of points `which` [count], from their rows of `states`, to their rows of `motions`.
 using MovePoints = void (*)(const CarriedPoint* points, const std::uint32_t* which, std::size_t count,
                             const double* velocity, const double* states, double* motions);
 
-// Of ContactFriction: tau [s]; `drift` [s] of the step that is finished, where the slips in `records` are to be brought
-// up to date by it, or negative.
-struct Rubbing {
-  double damping, drift;
-  const double *states, *motions;
-  double* records;
-};
-// Friction and damping of pairs that do not stick, one after another to `rubbing` (PairView::count rows); `friction`: mu
-// (count).
-using RubPairs = void (*)(const PairView& pairs, const Rubbing& with, const double* friction,
-                          double* rubbing);
-
-// Adds `loads` (count rows) of points `which` [count] to `forces` (elements x 3) [N].
+// Adds up the loads of PairView::which, by their rows of `states` and of `rubbing`, either of which may be nothing, to the
+// rows of their points, one pair after another.
+using CollectLoads = void (*)(const PairView& pairs, const double* states, const double* rubbing,
+                              double* loads);
+// Adds `loads` (rows) of points `which` [count] to `forces` (elements x 3) [N].
 using SpreadLoads = void (*)(const CarriedPoint* points, const double* states, const std::uint32_t* which,
                              std::size_t count, const double* loads, double* forces);
 
@@ -88,7 +93,7 @@ struct ContactTable {
   LookAtPairs look;
   EvaluatePairs evaluate;
   MovePoints move;
-  RubPairs rub;
+  CollectLoads collect;
   SpreadLoads spread;
 };
 

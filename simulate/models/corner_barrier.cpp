@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kStrength = 4;              // times mu
 constexpr double kGoesOn = 1.0 / 16;         // r below which b is quadratic
+constexpr double kRounding = 1e-9;           // more than that of corner_volumes()
 constexpr double kFarSquared = 0.41 * 0.41;  // (1 - 0.41)^3 > 0.2
 
 struct Barrier {
@@ -53,17 +54,14 @@ Mat3 cofactor_of(const Mat3& f) {
   return c;
 }
 
-double corner_volume(const CellKind& kind, const CellVectors& u, std::size_t corner) {
-  return 1 + volume_change(corner_gradient(kind, u, static_cast<std::uint32_t>(corner)));
-}
-
 // Calls visit(Corner) for the corners whose barrier is not zero.
 template <class Visit>
 void visit_folding(const CellKind& kind, const CornerThresholds& thresholds, const CellVectors& u,
                    const Visit& visit) {
   if (far_from_folding(kind, u)) return;
+  const CornerVolumes volumes = corner_volumes(kind, u);
   for (std::size_t c = 0; c < 8; ++c) {
-    if (!(thresholds[c] > 0)) continue;
+    if (!(thresholds[c] > 0) || volumes[c] > (1 + kRounding) * thresholds[c]) continue;
     const Mat3 gradient = corner_gradient(kind, u, static_cast<std::uint32_t>(c));
     const double r = (1 + volume_change(gradient)) / thresholds[c];
     if (!(r < 1)) continue;
@@ -95,6 +93,25 @@ Mat3 crossed_with(const Vec3& v) {
 
 }  // namespace
 
+// The edges at a corner span it: by what they do at rest, whose directions are square to one another.
+CornerVolumes corner_volumes(const CellKind& kind, const CellVectors& u) {
+  std::array<Vec3, 3> slope, rest;
+  double scale = 1;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    slope[axis] = slope_of(kind, axis);
+    rest[axis] = slope[axis] / slope[axis].squaredNorm();
+  }
+  scale /= rest[0].dot(rest[1].cross(rest[2]));
+  std::array<std::array<Vec3, 8>, 3> edge;  // of each axis, by its first corner
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    for (std::size_t a = 0; a < 8; ++a)
+      if (!(a >> axis & 1)) edge[axis][a] = rest[axis] + u[a | std::size_t{1} << axis] - u[a];
+  CornerVolumes volumes;
+  for (std::size_t c = 0; c < 8; ++c)
+    volumes[c] = scale * edge[0][c & 6].dot(edge[1][c & 5].cross(edge[2][c & 3]));
+  return volumes;
+}
+
 CornerThresholds fold_thresholds(const CellKind& kind, const std::optional<CellKind>& shaped) {
   CornerThresholds thresholds;
   thresholds.fill(kFoldThreshold);
@@ -112,7 +129,8 @@ CornerThresholds fold_thresholds(const CellKind& kind, const std::optional<CellK
       moved += hourglass_sign(m, static_cast<int>(a)) * shaped->mode_offset[static_cast<std::size_t>(m)];
     u[a] = f * (at + moved) - at;
   }
-  for (std::size_t c = 0; c < 8; ++c) thresholds[c] *= std::clamp(corner_volume(kind, u, c), 0.0, 1.0);
+  const CornerVolumes volumes = corner_volumes(kind, u);
+  for (std::size_t c = 0; c < 8; ++c) thresholds[c] *= std::clamp(volumes[c], 0.0, 1.0);
   return thresholds;
 }
 
@@ -138,8 +156,9 @@ bool far_from_folding(const CellKind& kind, const CellVectors& u, const CellVect
 
 double nearest_to_folding(const CellKind& kind, const CornerThresholds& thresholds, const CellVectors& u) {
   double least = std::numeric_limits<double>::infinity();
+  const CornerVolumes volumes = corner_volumes(kind, u);
   for (std::size_t c = 0; c < 8; ++c)
-    if (thresholds[c] > 0) least = std::min(least, corner_volume(kind, u, c) / thresholds[c]);
+    if (thresholds[c] > 0) least = std::min(least, volumes[c] / thresholds[c]);
   return least;
 }
 

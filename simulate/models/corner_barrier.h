@@ -23,6 +23,10 @@ using CornerThresholds = std::array<double, 8>;  // T of the corners; 0: no barr
 // Those of a cell of the lattice; with `shaped`, its kind with a rest shape of its own (with_rest_shape).
 [[nodiscard]] CornerThresholds fold_thresholds(const CellKind& kind, const std::optional<CellKind>& shaped);
 
+// (8) J_c, to rounding.
+using CornerVolumes = std::array<double, 8>;
+[[nodiscard]] CornerVolumes corner_volumes(const CellKind& kind, const CellVectors& displacement);
+
 // No corner has J_c < 0.2, as the lengths of the edges alone tell: |F_c - I| is below 0.41 everywhere. False
 // says nothing. With `more`: nor will it, however the elements go on by `factor` times those.
 [[nodiscard]] bool far_from_folding(const CellKind& kind, const CellVectors& displacement,

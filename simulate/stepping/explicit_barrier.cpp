@@ -45,15 +45,15 @@ bool ExplicitBarrier::may_fold(std::uint32_t cell, const CellKind& kind, const S
   const CellVectors u = corners(cell, state.displacement), v = corners(cell, state.velocity);
   if (far_from_folding(kind, u, &v, ahead)) return false;
   const CornerThresholds least = thresholds(cell);
-  for (std::uint32_t c = 0; c < 8; ++c) {
-    if (!(least[c] > 0)) continue;
-    const Mat3 gradient = corner_gradient(kind, u, c), rate = corner_gradient(kind, v, c);
-    const double now = 1 + volume_change(gradient);
-    // Jacobian's rate: the change of J_c over a small part of the way, which is a cubic in time.
-    const double part = 1e-3 * ahead;
-    const double then = part > 0 ? (volume_change(gradient + part * rate) + 1 - now) * 1e3 : 0;
-    if (now < 2 * least[c] || now + std::min(then, 0.0) < least[c]) return true;
-  }
+  // Jacobian's rate: the change of J_c over a small part of the way, which is a cubic in time.
+  constexpr double kPart = 1e-3;
+  CellVectors soon;
+  for (std::size_t a = 0; a < 8; ++a) soon[a] = u[a] + kPart * ahead * v[a];
+  const CornerVolumes now = corner_volumes(kind, u), then = corner_volumes(kind, soon);
+  for (std::size_t c = 0; c < 8; ++c)
+    if (least[c] > 0 &&
+        (now[c] < 2 * least[c] || now[c] + std::min((then[c] - now[c]) / kPart, 0.0) < least[c]))
+      return true;
   return false;
 }
 

@@ -198,6 +198,10 @@ void TimeSegment::look() {
 
 void TimeSegment::choose_step(Clock& clock) {
   look();
+  choose_step_as_seen(clock);
+}
+
+void TimeSegment::choose_step_as_seen(Clock& clock) {
   const double longest = bound_->longest(staged_.has_value());
   if (!(longest > 0)) throw DivergedError(where_it_folds(problem_, state_, scene_.run.method));
   double step = kShareOfBound * longest;
@@ -247,7 +251,7 @@ void TimeSegment::adapt_step(Clock& clock) {
   clock.damping_rate = bound_->damping_rate();
   const double longest = bound_->longest(staged_.has_value());
   if (clock.step > 0.97 * longest || (!scene_.run.step && clock.step < 0.6 * kShareOfBound * longest))
-    choose_step(clock);
+    choose_step_as_seen(clock);  // refuse_unsound() has looked
 }
 
 void TimeSegment::renew_damping(Clock& clock) {

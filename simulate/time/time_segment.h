@@ -141,6 +141,7 @@ class TimeSegment {
   [[nodiscard]] std::unique_ptr<EnergyHistory> make_history(EnergyBalance balance) const;
 
  private:
+  void choose_step_as_seen(Clock& clock);  // without the look at the state
   class ModelTimer;
   void configure_kernel();
   void add_fused();

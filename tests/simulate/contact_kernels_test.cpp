@@ -70,22 +70,29 @@ TEST(ContactKernels, PairsAreThoseOfPairState) {
           ball || n % 4 == 2 ? 0.0 : 1.0, ball ? 0.3 : 0.0};
     }
     std::vector<contact_kernels::PairSides> sides;
-    std::vector<PairConstants> constants;
-    std::vector<double> allowed, soft;
+    std::vector<ContactPair> pairs;
+    std::vector<PairRecord> records;
+    std::vector<double> allowed;
     std::vector<std::uint32_t> which;
     for (std::uint32_t p = 0; p < kPairs; ++p) {
       const bool plane = p % 5 == 4;
       sides.push_back({p % 10, plane ? 0 : (p * 3 + 1) % 10, plane ? 1u : 0u});
-      constants.push_back({2 + one(random), plane ? 0 : 0.7, 0.3, 0.8, 0.3, {0.01, 0.25, 0}});
+      pairs.push_back({{{2 + one(random), plane ? 0 : 0.7, 0.3, 0.8, 0.3, {0.01, 0.25, 0}}}});
       allowed.push_back(p % 3 ? 0 : 0.02);
-      soft.push_back(p % 2 ? 0 : 0.03 + 0.02 * one(random));
+      pairs.back().rest_overlap = allowed.back();
+      records.emplace_back().soft = p % 2 ? 0 : 0.03 + 0.02 * one(random);
       which.push_back(p);
     }
     for (const ContactTable* table : kernel_tables()) {
       std::vector<PairState> found(kPairs);
-      table->evaluate({which.data(), kPairs, sides.data(), reinterpret_cast<const char*>(constants.data()),
-                       sizeof(PairConstants), rows(points), rows(planes)},
-                      allowed.data(), soft.data(), rows(found));
+      std::vector<std::uint8_t> marks(kPairs);
+      std::vector<double> lost(kPairs);
+      contact_kernels::PairStep step;
+      step.records = rows(records);
+      step.marks = marks.data();
+      step.lost = lost.data();
+      table->evaluate({which.data(), kPairs, sides.data(), rows(pairs), rows(points), rows(planes)},
+                      trial % 2 ? allowed.data() : nullptr, step, rows(found));
       for (std::size_t p = 0; p < kPairs; ++p) {
         ContactSide i = points[sides[p].i].side, j;
         if (sides[p].of_plane) {
@@ -96,8 +103,11 @@ TEST(ContactKernels, PairsAreThoseOfPairState) {
         } else {
           j = points[sides[p].j].side;
         }
-        const PairState expected = pair_state(i, j, constants[p], allowed[p], soft[p]);
+        const PairState expected =
+            pair_state(i, j, pairs[p].properties.constants, allowed[p], records[p].soft);
         expect_same(expected, found[p]);
+        ASSERT_EQ((marks[p] & contact_kernels::kPresses) != 0,
+                  expected.near && !expected.deep && expected.pressure > 0);
         if (HasFatalFailure()) return;
         pressing += expected.pressure > 0;
         deep += expected.deep;
@@ -176,8 +186,8 @@ void expect_same_bytes(const std::vector<Row>& expected, const std::vector<Row>&
 
 // What all kernels make of two blocks that are pressed into each other and slide.
 struct KernelResults {
-  std::vector<double> path, turn, forces;
-  std::vector<std::uint8_t> near;
+  std::vector<double> path, turn, lost, forces;
+  std::vector<std::uint8_t> near, marks;
   std::vector<PairState> states;
   std::vector<PointMotion> motions;
   std::vector<PairRecord> records;
@@ -190,46 +200,78 @@ KernelResults results_of(const ContactTable& table, const PairList& list, const 
   std::vector<std::uint32_t> points(list.points().size()), pairs(count);
   for (std::uint32_t n = 0; n < points.size(); ++n) points[n] = n;
   std::vector<contact_kernels::PairSides> sides;
-  std::vector<double> zero(count, 0), friction(count, 0.3);
+  std::vector<double> zero(count, 0);
   for (std::uint32_t p = 0; p < count; ++p) {
     pairs[p] = p;
     sides.push_back({list.pairs()[p].i, list.pairs()[p].j, 0});
   }
-  KernelResults made{std::vector<double>(count),
-                     std::vector<double>(count),
-                     std::vector<double>(3 * state.displacement.size(), 0),
-                     std::vector<std::uint8_t>(count),
-                     std::vector<PairState>(count),
-                     std::vector<PointMotion>(points.size()),
-                     std::vector<PairRecord>(count),
-                     std::vector<PairRubbing>(count)};
+  KernelResults made{std::vector<double>(count),       std::vector<double>(count),
+                     std::vector<double>(count),       std::vector<double>(3 * state.displacement.size(), 0),
+                     std::vector<std::uint8_t>(count), std::vector<std::uint8_t>(count),
+                     std::vector<PairState>(count),    std::vector<PointMotion>(points.size()),
+                     std::vector<PairRecord>(count),   std::vector<PairRubbing>(count)};
   std::vector<PointState> at(points.size());
   std::vector<PointLoad> loads(points.size());
   table.place(cells.points().data(), points.data(), points.size(), state.displacement.data()->data(),
               rows(at));
-  const contact_kernels::PairView view{
-      pairs.data(),
-      count,
-      sides.data(),
-      reinterpret_cast<const char*>(&list.pairs().front().properties.constants),
-      sizeof(ContactPair),
-      rows(at),
-      nullptr};
+  const contact_kernels::PairView view{pairs.data(),       count,    sides.data(),
+                                       rows(list.pairs()), rows(at), nullptr};
   table.look(view, zero.data(), made.path.data(), made.turn.data(), made.near.data());
-  table.evaluate(view, zero.data(), zero.data(), rows(made.states));
   table.move(cells.points().data(), points.data(), points.size(), state.velocity.data()->data(), rows(at),
              rows(made.motions));
-  table.rub(view, {1e-4, 1e-3, rows(made.states), rows(made.motions), rows(made.records)}, friction.data(),
-            rows(made.rubbing));
-  for (std::size_t p = 0; p < count; ++p) {
-    PointLoad& load = loads[sides[p].j];
-    load.force += made.states[p].force + made.rubbing[p].force;
-    load.turning += made.states[p].turning[1];
-    load.couple += made.rubbing[p].force * made.rubbing[p].way.transpose();
-  }
+  for (PairRecord& record : made.records) record.soft = 0.02 * kSide;
+  table.evaluate(view, zero.data(),
+                 {rows(made.records), 1e-4, 1e-3, rows(made.motions), rows(made.rubbing), made.lost.data(),
+                  made.marks.data()},
+                 rows(made.states));
+  table.collect(view, rows(made.states), rows(made.rubbing), rows(loads));
   table.spread(cells.points().data(), rows(at), points.data(), points.size(), rows(loads),
                made.forces.data());
   return made;
+}
+
+// What collect() makes of rows one by one, as contact_loads.h has it.
+TEST(ContactKernels, LoadsAreThoseOfPairsOneByOne) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> one(-1, 1);
+  const auto vector = [&] { return Vec3(one(random), one(random), one(random)); };
+  constexpr std::uint32_t kPoints = 5, kPairs = 17;
+  std::vector<contact_kernels::PairSides> sides;
+  std::vector<PairState> states(kPairs);
+  std::vector<PairRubbing> rubbing(kPairs);
+  std::vector<std::uint32_t> which;
+  std::vector<PointLoad> along(kPoints), across(kPoints);
+  for (std::uint32_t p = 0; p < kPairs; ++p) {
+    const bool plane = p % 5 == 4;
+    sides.push_back({p % kPoints, plane ? 0 : (p * 3 + 1) % kPoints, plane ? 1u : 0u});
+    states[p].force = vector();
+    states[p].turning = {vector(), vector()};
+    rubbing[p] = {vector(), vector(), 0.5 * static_cast<double>(p % 3)};
+    which.push_back(p);
+    const auto& [force, way, share] = rubbing[p];
+    along[sides[p].i].force -= states[p].force;
+    along[sides[p].i].turning += states[p].turning[0];
+    across[sides[p].i].force -= force;
+    across[sides[p].i].couple -= force * (share * way).transpose();
+    if (plane) continue;
+    along[sides[p].j].force += states[p].force;
+    along[sides[p].j].turning += states[p].turning[1];
+    across[sides[p].j].force += force;
+    across[sides[p].j].couple += force * ((share - 1) * way).transpose();
+  }
+  for (const ContactTable* table : kernel_tables()) {
+    std::vector<PointLoad> found_along(kPoints), found_across(kPoints);
+    const contact_kernels::PairView view{which.data(), kPairs, sides.data(), nullptr, nullptr, nullptr};
+    table->collect(view, rows(states), nullptr, rows(found_along));
+    table->collect(view, nullptr, rows(rubbing), rows(found_across));
+    for (std::uint32_t n = 0; n < kPoints; ++n)
+      for (const auto& [expected, found] :
+           {std::pair(along[n], found_along[n]), std::pair(across[n], found_across[n])}) {
+        EXPECT_EQ(expected.force, found.force);
+        EXPECT_EQ(expected.turning, found.turning);
+        EXPECT_EQ(expected.couple, found.couple);
+      }
+  }
 }
 
 TEST(ContactKernels, EveryInstructionSetGivesTheSameBits) {
@@ -238,6 +280,7 @@ TEST(ContactKernels, EveryInstructionSetGivesTheSameBits) {
   const Problem problem = problem_of(body);
   ContactSettings settings = all_parts(body);
   settings.self = false;
+  settings.friction = 0.3;
   const ContactSurface surface(problem, settings.parts);
   PairList list(settings, problem, surface);
   State state = starting_at_rest(body);
@@ -258,11 +301,14 @@ TEST(ContactKernels, EveryInstructionSetGivesTheSameBits) {
     expect_same_bytes(first.turn, found.turn);
     expect_same_bytes(first.forces, found.forces);
     expect_same_bytes(first.near, found.near);
+    expect_same_bytes(first.marks, found.marks);
+    expect_same_bytes(first.lost, found.lost);
     expect_same_bytes(first.motions, found.motions);
     expect_same_bytes(first.rubbing, found.rubbing);
     for (std::size_t p = 0; p < found.states.size(); ++p) {
       expect_same(first.states[p], found.states[p]);
       EXPECT_EQ(first.records[p].slip, found.records[p].slip);
+      EXPECT_EQ(first.records[p].soft, found.records[p].soft);
     }
   }
 }

@@ -1,10 +1,26 @@
-// Points of one cell are found by sorting them by their elements.
+// Points are told by the cells that carry them.
 #include "simulate/contact/pairs/carrying_cells.h"
 
 #include <algorithm>
 #include <numeric>
 
+#include "base/instruction_set.h"
+
 namespace flexel::simulate {
+
+static_assert(sizeof(ContactSide) == sizeof(double) * contact_kernels::kSideRow &&
+              sizeof(PointState) == sizeof(double) * contact_kernels::kPointRow &&
+              sizeof(PointMotion) == sizeof(double) * contact_kernels::kMotionRow);
+
+const contact_kernels::ContactTable& contact_kernel_table() {
+  using namespace contact_kernels;
+#if defined(__x86_64__)
+  static const ContactTable& best = best_table(&contacts_portable, &contacts_avx2, &contacts_avx512);
+  return best;
+#else
+  return contacts_portable();
+#endif
+}
 
 CarryingCells::CarryingCells(const ContactSurface& surface) : surface_(surface) {
   for (std::uint32_t p = 0; p < surface.body().parts.size(); ++p) {
@@ -16,30 +32,48 @@ CarryingCells::CarryingCells(const ContactSurface& surface) : surface_(surface) 
 }
 
 void CarryingCells::reset(const PairList& list) {
+  constexpr std::uint32_t kNone = 0xffffffff;
   const std::vector<std::uint32_t>& points = list.points();
-  const auto elements_of = [&](std::uint32_t number) -> const auto& {
-    return list.point(number).at.elements;
-  };
-  std::vector<std::uint32_t> order(points.size());
-  std::iota(order.begin(), order.end(), std::uint32_t{0});
-  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return elements_of(a) == elements_of(b) ? a < b : elements_of(a) < elements_of(b);
-  });
+  places_.resize(surface_.body().element_count());
+  for (std::uint32_t n = 0; n < list.elements().size(); ++n) places_[list.elements()[n]] = n;
+  cell_.assign(surface_.body().cell_count(), kNone);
   cells_.clear();
   points_.resize(points.size());
-  for (std::size_t n = 0; n < order.size(); ++n) {
-    const ContactPoint& point = list.point(order[n]);
-    if (n == 0 || point.at.count != 8 || elements_of(order[n]) != elements_of(order[n - 1])) {
-      CarryingCell cell{point.part, order[n], {}, point.at.count};
-      for (std::size_t a = 0; a < point.at.count; ++a)
-        cell.corners[a] = static_cast<std::uint32_t>(
-            std::lower_bound(list.elements().begin(), list.elements().end(), point.at.elements[a]) -
-            list.elements().begin());
-      cells_.push_back(cell);
+  states_.resize(points.size());
+  motions_.resize(points.size());
+  wanted_by_.resize(points.size(), 0);
+  for (std::uint32_t n = 0; n < points.size(); ++n) {
+    const ContactPoint& point = list.point(n);
+    const std::optional<std::uint32_t> carrier = surface_.cell(points[n]);
+    std::uint32_t own = carrier ? cell_[*carrier] : kNone;
+    if (own == kNone) {
+      own = static_cast<std::uint32_t>(cells_.size());
+      CarryingCell& cell = cells_.emplace_back(CarryingCell{point.part, n, {}, point.at.count});
+      for (std::size_t a = 0; a < point.at.count; ++a) cell.corners[a] = places_[point.at.elements[a]];
+      if (carrier) cell_[*carrier] = own;
     }
-    points_[order[n]] = carried(point, surface_.broken(points[order[n]]));
-    points_[order[n]].cell = static_cast<std::uint32_t>(cells_.size() - 1);
+    points_[n] = carried(point, surface_.broken(points[n]));
+    points_[n].cell = own;
   }
+}
+
+void CarryingCells::want_none() {
+  ++asked_;
+  wanted_.clear();
+}
+
+void CarryingCells::place(const State& state, bool moving) {
+  constexpr std::size_t kGrain = 256;
+  if (points_.empty()) return;
+  parallel_chunks(wanted_.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    auto* states = reinterpret_cast<double*>(states_.data());
+    const std::uint32_t* which = wanted_.data() + begin;
+    contact_kernel_table().place(points_.data(), which, end - begin, state.displacement.data()->data(),
+                                 states);
+    if (moving)
+      contact_kernel_table().move(points_.data(), which, end - begin, state.velocity.data()->data(), states,
+                                  reinterpret_cast<double*>(motions_.data()));
+  });
 }
 
 CarriedPoint CarryingCells::carried(const ContactPoint& point, bool broken) const {

@@ -1,7 +1,9 @@
-// The cells that carry the points of a list of pairs, and where in them the points are. Elements are numbered as in
+// The cells that carry the points of a list of pairs, and where the points are and go in a state. Elements are numbered as in
 // PairList::elements(), so that what a step reads of them lies together in memory; what points of one cell share
 // is found once.
 #pragma once
+#include <utility>
+
 #include "simulate/contact/pairs/pair_list.h"
 #include "simulate/kernels/kernel_contact.h"
 
@@ -16,6 +18,15 @@ struct CarryingCell {
 
 using contact_kernels::CarriedPoint;
 
+// Of this machine.
+[[nodiscard]] const contact_kernels::ContactTable& contact_kernel_table();
+
+// Of a point: m/s; dv/dx of its cell [1/s]. A row of simulate/kernels/kernel_contact.h.
+struct alignas(64) PointMotion {
+  Vec3 velocity = Vec3::Zero();
+  Mat3 gradient = Mat3::Zero();
+};
+
 class CarryingCells {
  public:
   explicit CarryingCells(const ContactSurface& surface);  // outlives this
@@ -25,6 +36,16 @@ class CarryingCells {
 
   [[nodiscard]] const std::vector<CarryingCell>& cells() const { return cells_; }
   [[nodiscard]] const std::vector<CarriedPoint>& points() const { return points_; }  // (PairList::points())
+  // Points whose state and, if `moving`, motion place() finds: none, and those that are wanted since.
+  void want_none();
+  void want(std::uint32_t point) {
+    if (std::exchange(wanted_by_[point], asked_) != asked_) wanted_.push_back(point);
+  }
+  [[nodiscard]] const std::vector<std::uint32_t>& wanted() const { return wanted_; }
+  void place(const State& state, bool moving);
+  [[nodiscard]] const std::vector<PointState>& states() const { return states_; }     // (points())
+  [[nodiscard]] const std::vector<PointMotion>& motions() const { return motions_; }  // (points())
+
   // (axes) 1/m, gradients of the cell's weights along its axes: that of corner a is the sum of these with the
   // signs of a.
   [[nodiscard]] const std::array<Vec3, 3>& slopes(std::uint32_t part) const { return slopes_[part]; }
@@ -42,9 +63,16 @@ class CarryingCells {
 
   const ContactSurface& surface_;
   std::vector<CarryingCell> cells_;
+  std::vector<std::uint32_t> places_,
+      cell_;  // (elements) in PairList::elements(); (cells) in cells_: of reset()
   std::vector<CarriedPoint> points_;
   std::vector<std::array<Vec3, 3>> slopes_;  // (parts)
   std::vector<Vec3> steepness_;              // (parts) 1/m, norms of the slopes
+  std::vector<std::uint32_t> wanted_;
+  std::vector<std::uint64_t> wanted_by_;  // (points_) by which of all askings
+  std::uint64_t asked_ = 0;
+  std::vector<PointState> states_;
+  std::vector<PointMotion> motions_;
 };
 
 }  // namespace flexel::simulate

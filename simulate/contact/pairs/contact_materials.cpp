@@ -9,8 +9,12 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kStiffness = 3;       // of a contact, in E / h an area
+constexpr double kStiffness = 3;  // of a contact, in E / h an area
+// Radius of the kernel, of a spacing: a little less than one, so that faces whose lattices lie on each other have no pairs
+// of neighbours with next to no weight.
+constexpr double kReach = 0.995;
 constexpr double kSoft = 0.01;         // of a spacing, over which pressure begins
+constexpr double kFarthestSoft = 0.4;  // of a spacing, that an impact makes it at most
 constexpr double kMostPullOff = 0.35;  // spacings, at most, of the extension at which adhesion ends
 
 }  // namespace
@@ -32,8 +36,8 @@ PairProperties ContactMaterials::between(std::uint32_t i, std::uint32_t j) const
   const ContactPoint &a = surface_.points()[i], &b = surface_.points()[j];
   // the faces beside an edge have all of the adhering area
   const bool edged = a.shape == ContactShape::edge || b.shape == ContactShape::edge;
-  return {0.5 * (friction(i) + friction(j)), constants(i, j),
-          edged ? 0 : pull_off(i, 0.5 * (stick(i) + stick(j)), foundation(i, j))};
+  return {constants(i, j), 0.5 * (friction(i) + friction(j)),
+          edged ? 0 : pull_off(i, 0.5 * (stick(i) + stick(j)), foundation(i, j)), kFarthestSoft * a.width};
 }
 
 PairProperties ContactMaterials::against_plane(std::uint32_t point, const ContactPlane& plane) const {
@@ -41,8 +45,8 @@ PairProperties ContactMaterials::against_plane(std::uint32_t point, const Contac
   const double own = friction(point);
   const double traction =
       at.shape == ContactShape::edge ? 0 : 0.5 * (stick(point) + plane.stick.value_or(stick(point)));
-  return {0.5 * (own + plane.friction.value_or(own)), plane_constants(point),
-          pull_off(point, traction, foundation_[at.part])};
+  return {plane_constants(point), 0.5 * (own + plane.friction.value_or(own)),
+          pull_off(point, traction, foundation_[at.part]), kFarthestSoft * at.width};
 }
 
 bool ContactMaterials::dissipate() const {
@@ -94,7 +98,7 @@ PairConstants ContactMaterials::constants(std::uint32_t i, std::uint32_t j) cons
   const bool balls = a.radius > 0 && b.radius > 0;
   PairConstants pair;
   pair.stiffness = foundation(i, j) * (balls ? 0.5 * (a.area + b.area) : a.area * b.area);
-  pair.width = balls ? 0 : std::max(a.width, b.width);
+  pair.width = balls ? 0 : kReach * std::max(a.width, b.width);
   pair.facing_from = std::min(a.facing_from, b.facing_from);
   pair.facing_fully = std::min(a.facing_fully, b.facing_fully);
   pair.limit = a.depth + b.depth;

@@ -7,9 +7,11 @@
 namespace flexel::simulate {
 
 struct PairProperties {
-  double friction = 0;  // mu
   PairConstants constants;
+  double friction = 0;  // mu
   double pull_off = 0;  // m, extension at which adhesion ends; 0: the pair does not stick
+  double farthest_soft =
+      0;  // m, at most, of PairRecord::soft that an approach makes: two steps of contact_step_bound.cpp
 };
 
 class ContactMaterials {

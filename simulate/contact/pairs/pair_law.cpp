@@ -15,22 +15,23 @@ struct Smooth {
 // K over t^2, and its derivative.
 Smooth kernel(double squared, double width) {
   if (!(width > 0)) return {1, 0};
-  const double q = 1 - squared / (width * width);
+  const double per_square = 1 / (width * width);
+  const double q = 1 - squared * per_square;
   if (!(q > 0)) return {};
-  const double scale = 3 / (std::numbers::pi * width * width);
-  return {scale * q * q, -2 * scale * q / (width * width)};
+  const double scale = (3 / std::numbers::pi) * per_square;
+  return {scale * q * q, -2 * scale * q * per_square};
 }
 
 // 0 below `from`, 1 above `to`, a cubic between.
 Smooth ramp(double at, double from, double to) {
-  const double s = (at - from) / (to - from);
+  const double per_length = 1 / (to - from);
+  const double s = (at - from) * per_length;
   if (s <= 0) return {};
   if (s >= 1) return {1, 0};
-  return {s * s * (3 - 2 * s), 6 * s * (1 - s) / (to - from)};
+  return {s * s * (3 - 2 * s), 6 * s * (1 - s) * per_length};
 }
 
-}  // namespace
-
+// Under a law of its own.
 void press(PairState& now, const ContactSide& i, const ContactSide& j, const NormalLaw& normal_law) {
   const NormalLaw::Value law = normal_law.at(-now.gap);
   now.stiffness = now.weight * law.stiffness;
@@ -53,6 +54,8 @@ void press(PairState& now, const ContactSide& i, const ContactSide& j, const Nor
   }
 }
 
+}  // namespace
+
 PairState pair_state(const ContactSide& i, const ContactSide& j, const PairConstants& pair, double allowed,
                      double soft) {
   PairState now;
@@ -67,7 +70,7 @@ PairState pair_state(const ContactSide& i, const ContactSide& j, const PairConst
   const double length = b.norm();
   const bool balls = i.radius > 0 && j.radius > 0;
   if (!balls && !(length > 0)) return now;  // two that have no plane of their own
-  now.normal = balls ? d.normalized() : Vec3(b / length);
+  now.normal = balls ? d.normalized() : Vec3((1 / length) * b);
   now.along = d.dot(now.normal);
   now.gap = now.along - i.radius - j.radius + allowed;
   now.offset = balls ? Vec3(Vec3::Zero()) : Vec3(d - now.along * now.normal);

@@ -43,10 +43,11 @@ struct NormalLaw {
     const double delta = depth + ahead;
     if (!(delta > 0)) return value;
     if (delta < soft) {
-      value.energy += delta * delta * delta / (6 * soft);
-      value.pressure += delta * delta / (2 * soft);
+      const double share = delta / soft;
+      value.energy += (1.0 / 6) * delta * delta * share;
+      value.pressure += 0.5 * delta * share;
     } else {
-      value.energy += 0.5 * delta * (delta - soft) + soft * soft / 6;
+      value.energy += 0.5 * delta * (delta - soft) + (1.0 / 6) * soft * soft;
       value.pressure += delta - 0.5 * soft;
     }
     return value;
@@ -79,7 +80,7 @@ struct alignas(64) PairState {
   double pressure = 0;         // N, magnitude of the force along the normal
   double stiffness = 0;        // N/m
   double share = 0;            // of the soft part: its slope in that of the linear range
-  // Of the geometry, for press(): d . n [m]; |b|, 0 for balls; derivatives of the weight by half of t^2 [N/m^3],
+  // Of the geometry: d . n [m]; |b|, 0 for balls; derivatives of the weight by half of t^2 [N/m^3],
   // its sign turned, and by c [N/m].
   double along = 0, length = 0, narrowing = 0, facing_slope = 0;
   bool near = false;  // within the kernel and facing; else the rest is not set
@@ -90,8 +91,5 @@ struct alignas(64) PairState {
 // wider than the law's own.
 [[nodiscard]] PairState pair_state(const ContactSide& i, const ContactSide& j, const PairConstants& pair,
                                    double allowed = 0, double soft = 0);
-// The same pair under a law of another softness: pair_state() with it, bit by bit. Only if it is near and not
-// deep.
-void press(PairState& now, const ContactSide& i, const ContactSide& j, const NormalLaw& law);
 
 }  // namespace flexel::simulate

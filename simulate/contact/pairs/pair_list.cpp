@@ -118,8 +118,6 @@ void PairList::build(const State& state) {
   pairs_.clear();
   add_pairs(positions, normals);
   add_plane_pairs(positions, normals);
-  std::sort(pairs_.begin(), pairs_.end(),
-            [](const ContactPair& a, const ContactPair& b) { return a.key < b.key; });
   number_points();
 }
 
@@ -155,10 +153,10 @@ bool PairList::may_touch(std::uint32_t i, std::uint32_t j, const std::vector<Vec
   if (a.part == b.part && (!settings_.self || surface_.rigid(a.part))) return false;
   if (surface_.prescribed(a.part) && surface_.prescribed(b.part)) return false;
   if (a.shape == ContactShape::edge && b.shape == ContactShape::edge) return false;
-  const double near = touching_distance(a, b) + skin_;
-  if ((positions[j] - positions[i]).squaredNorm() > near * near) return false;
   const bool faces = normals[i] != Vec3::Zero() && normals[j] != Vec3::Zero();
   if (faces && -normals[i].dot(normals[j]) < std::min(a.facing_from, b.facing_from) - turning()) return false;
+  const double near = touching_distance(a, b) + skin_;
+  if ((positions[j] - positions[i]).squaredNorm() > near * near) return false;
   return !excluded_.contains(i, j);
 }
 
@@ -180,49 +178,52 @@ void PairList::add_pairs(const std::vector<Vec3>& positions, const std::vector<V
       const std::uint32_t i = in_grid[a], j = in_grid[b];
       const PairProperties properties = materials_.between(i, j);
       pairs_.push_back(
-          {i, j, 0, std::uint64_t{i} << 32 | j, properties, rest_overlaps_.of(i, j, properties.constants)});
+          {properties, rest_overlaps_.of(i, j, properties.constants), std::uint64_t{i} << 32 | j, i, j});
     }
 }
 
+// By key, as the others are.
 void PairList::add_plane_pairs(const std::vector<Vec3>& positions, const std::vector<Vec3>& normals) {
   const std::vector<ContactPoint>& points = surface_.points();
-  for (std::uint32_t p = 0; p < settings_.planes.size(); ++p) {
-    const ContactPlane& plane = settings_.planes[p];
-    for (std::uint32_t i = 0; i < points.size(); ++i) {
-      if (surface_.prescribed(points[i].part)) continue;
+  const auto others = static_cast<std::ptrdiff_t>(pairs_.size());
+  for (std::uint32_t i = 0; i < points.size(); ++i) {
+    if (surface_.prescribed(points[i].part)) continue;
+    for (std::uint32_t p = 0; p < settings_.planes.size(); ++p) {
+      const ContactPlane& plane = settings_.planes[p];
       if ((positions[i] - plane.point).dot(plane.normal) - points[i].radius > skin_) continue;
       if (normals[i] != Vec3::Zero() && -normals[i].dot(plane.normal) < points[i].facing_from - turning())
         continue;
-      pairs_.push_back({i, ContactPair::kOfPlane, p, std::uint64_t{i} << 32 | (points.size() + p),
-                        materials_.against_plane(i, plane), 0});
+      pairs_.push_back({materials_.against_plane(i, plane), 0, std::uint64_t{i} << 32 | (points.size() + p),
+                        i, ContactPair::kOfPlane, p});
     }
   }
+  std::inplace_merge(pairs_.begin(), pairs_.begin() + others, pairs_.end(),
+                     [](const ContactPair& a, const ContactPair& b) { return a.key < b.key; });
 }
 
 // Pairs hold numbers of contact points so far; from here on places in points_.
 void PairList::number_points() {
   points_.clear();
   std::vector<std::uint32_t> number(surface_.points().size(), 0);
+  std::vector<std::uint8_t> carries(surface_.body().element_count(), 0);
   for (const ContactPair& pair : pairs_) {
     number[pair.i] = 1;
     if (!pair.of_plane()) number[pair.j] = 1;
   }
-  for (std::uint32_t i = 0; i < number.size(); ++i)
-    if (number[i]) {
-      number[i] = static_cast<std::uint32_t>(points_.size());
-      points_.push_back(i);
-    }
+  for (std::uint32_t i = 0; i < number.size(); ++i) {
+    if (!number[i]) continue;
+    number[i] = static_cast<std::uint32_t>(points_.size());
+    points_.push_back(i);
+    const InterpolationWeights& at = surface_.points()[i].at;
+    for (std::uint32_t a = 0; a < at.count; ++a) carries[at.elements[a]] = 1;
+  }
   for (ContactPair& pair : pairs_) {
     pair.i = number[pair.i];
     if (!pair.of_plane()) pair.j = number[pair.j];
   }
   elements_.clear();
-  for (const std::uint32_t point : points_) {
-    const InterpolationWeights& at = surface_.points()[point].at;
-    elements_.insert(elements_.end(), at.elements.begin(), at.elements.begin() + at.count);
-  }
-  std::sort(elements_.begin(), elements_.end());
-  elements_.erase(std::unique(elements_.begin(), elements_.end()), elements_.end());
+  for (const std::uint32_t e : surface_.elements())
+    if (carries[e]) elements_.push_back(e);
   runs_ = element_runs(elements_, surface_.body().parts);
 }
 

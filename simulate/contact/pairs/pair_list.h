@@ -9,14 +9,15 @@
 
 namespace flexel::simulate {
 
-struct ContactPair {
+// A row of simulate/kernels/kernel_contact.h.
+struct alignas(64) ContactPair {
   static constexpr std::uint32_t kOfPlane = 0xffffffff;
-  std::uint32_t i = 0, j = kOfPlane;  // numbers in PairList::points(); j kOfPlane: of a plane
-  std::uint32_t plane = 0;
-  std::uint64_t key = 0;  // contact points, i << 32 | j; a plane is numbered behind the last point
   PairProperties properties;
   // m, penetration at rest of two parts that presses nothing (simulate/contact/pairs/rest_overlaps.h)
   double rest_overlap = 0;
+  std::uint64_t key = 0;  // contact points, i << 32 | j; a plane is numbered behind the last point
+  std::uint32_t i = 0, j = kOfPlane;  // numbers in PairList::points(); j kOfPlane: of a plane
+  std::uint32_t plane = 0;
 
   [[nodiscard]] bool of_plane() const { return j == kOfPlane; }
 };

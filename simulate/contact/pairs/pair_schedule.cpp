@@ -2,6 +2,7 @@
 #include "simulate/contact/pairs/pair_schedule.h"
 
 #include <algorithm>
+#include <iterator>
 #include <numeric>
 
 namespace flexel::simulate {
@@ -13,13 +14,16 @@ constexpr double kHorizonPath = 0.05, kHorizonTurn = 0.02;  // of a pair
 }  // namespace
 
 void PairSchedule::reset(const std::vector<Bodies>& pairs, std::size_t bodies, double spacing) {
-  couples_ = pairs;
+  couples_.clear();
+  std::unique_copy(pairs.begin(), pairs.end(), std::back_inserter(couples_));
   std::sort(couples_.begin(), couples_.end());
   couples_.erase(std::unique(couples_.begin(), couples_.end()), couples_.end());
   couple_.resize(pairs.size());
   for (std::size_t p = 0; p < pairs.size(); ++p)
-    couple_[p] = static_cast<std::uint32_t>(std::lower_bound(couples_.begin(), couples_.end(), pairs[p]) -
-                                            couples_.begin());
+    couple_[p] = p > 0 && pairs[p] == pairs[p - 1]
+                     ? couple_[p - 1]
+                     : static_cast<std::uint32_t>(
+                           std::lower_bound(couples_.begin(), couples_.end(), pairs[p]) - couples_.begin());
   spacing_ = spacing;
   due_.resize(pairs.size());
   sum_.assign(bodies, {});
@@ -33,6 +37,13 @@ void PairSchedule::wake_all() {
   awake_.resize(couple_.size());
   std::iota(awake_.begin(), awake_.end(), std::uint32_t{0});
   left_ = {0, 0};
+  soon_.clear();
+}
+
+void PairSchedule::wake(std::uint32_t pair) {
+  keep_awake(pair);
+  const auto at = std::lower_bound(soon_.begin(), soon_.end(), pair);
+  if (at == soon_.end() || *at != pair) soon_.insert(at, pair);
 }
 
 SafeMotion PairSchedule::sums(const Bodies& of, const std::vector<BodyMotion>& motions) {

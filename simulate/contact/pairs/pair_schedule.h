@@ -38,6 +38,11 @@ class PairSchedule {
   // Lets the pair sleep if that is worth while; whether it does. Parallel, one call a pair.
   bool sleep(std::uint32_t pair, const SafeMotion& safe);
   void keep_awake(std::uint32_t pair) { due_[pair] = {0, 0}; }  // likewise
+  // A pair that is evaluated anyway is in awake() no more; and again from the next advance() on.
+  void rest(std::uint32_t pair) {
+    due_[pair].path = due_[pair].turn = std::numeric_limits<double>::infinity();
+  }
+  void wake(std::uint32_t pair);
   [[nodiscard]] bool sleeps(std::uint32_t pair) const { return !due(pair, next_); }
   // Ascending; of the last advance().
   [[nodiscard]] const std::vector<std::uint32_t>& awake() const { return awake_; }

@@ -4,39 +4,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <limits>
-#include <numeric>
-#include <utility>
-
-#include "base/instruction_set.h"
-
 namespace flexel::simulate {
 namespace {
 
-constexpr double kSoftSteps = 2;       // in which an impact goes through the soft part of the contact law
-constexpr double kFarthestSoft = 0.4;  // spacings, at most, of that part: two steps of contact_step_bound.cpp
-constexpr double kHardening = 0.001;   // a step, of what rests: the share of its extra softness that goes
-constexpr double kHardened = 1.01;     // of the least softness, at which that is over
-constexpr double kNoTurn = 1e-9;       // of a body in a step
+constexpr double kNoTurn = 1e-9;          // of a body in a step
 constexpr double kShapelessEntry = 0.05;  // spacings; most penetration with which shapeless points approach
 
-static_assert(sizeof(ContactSide) == sizeof(double) * contact_kernels::kSideRow &&
-              sizeof(PointState) == sizeof(double) * contact_kernels::kPointRow &&
+static_assert(sizeof(ContactPair) == sizeof(double) * contact_kernels::kPairRow &&
               sizeof(PairConstants) == sizeof(double) * contact_kernels::kConstantsRow &&
-              sizeof(PairState) == sizeof(double) * contact_kernels::kStateRow);
+              sizeof(PairState) == sizeof(double) * contact_kernels::kStateRow &&
+              sizeof(PairRecord) == sizeof(double) * contact_kernels::kRecordRow &&
+              sizeof(PairRubbing) == sizeof(double) * contact_kernels::kRubbingRow);
 
 }  // namespace
-
-const contact_kernels::ContactTable& contact_kernel_table() {
-  using namespace contact_kernels;
-#if defined(__x86_64__)
-  static const ContactTable& best = best_table(&contacts_portable, &contacts_avx2, &contacts_avx512);
-  return best;
-#else
-  return contacts_portable();
-#endif
-}
 
 PairStates::PairStates(const ContactSettings& settings, const ContactSurface& surface, const PairList& list,
                        PairMemory& memory, OverlapRelease& release)
@@ -48,11 +28,15 @@ PairStates::PairStates(const ContactSettings& settings, const ContactSurface& su
       cells_(surface) {}
 
 void PairStates::reset() {
-  states_.assign(list_.pairs().size(), PairState{});
+  states_.resize(list_.pairs().size());
+  rubbing_.resize(list_.pairs().size());
   is_active_.assign(list_.pairs().size(), 0);
   active_.clear();
-  points_.resize(list_.points().size());
-  point_evaluation_.assign(points_.size(), 0);
+  acting_.clear();
+  acting_points_.clear();
+  others_act_ =
+      release_.enabled() || std::any_of(list_.pairs().begin(), list_.pairs().end(),
+                                        [](const ContactPair& pair) { return pair.properties.pull_off > 0; });
   const auto planes = static_cast<std::uint32_t>(surface_.body().parts.size());
   std::vector<PairSchedule::Bodies> bodies;
   for (const ContactPair& pair : list_.pairs())
@@ -123,9 +107,34 @@ bool PairStates::is_at(const State& state) const {
          same_bits(list_.runs(), state.displacement, moved_from_);
 }
 
+contact_kernels::PairStep PairStates::step(double drift, bool moving, bool rubs, double damping) {
+  contact_kernels::PairStep made;
+  made.records = reinterpret_cast<double*>(memory_.data());
+  made.damping = damping;
+  made.drift = drift;
+  if (moving) made.motions = reinterpret_cast<const double*>(cells_.motions().data());
+  if (rubs) made.rubbing = reinterpret_cast<double*>(rubbing_.data());
+  return made;
+}
+
 void PairStates::update(const State& state, bool all) {
-  const bool same = release_.is_at(state) && is_at(state);
-  if (same && (!all || evaluated_all_)) return;
+  if (release_.is_at(state) && is_at(state) && (!all || evaluated_all_)) return;
+  evaluate(state, all, step(-1, false, false, 0));
+}
+
+void PairStates::go_through(const State& state, double drift, bool rubs, double damping) {
+  const contact_kernels::PairStep through = step(drift, true, rubs, damping);
+  if (release_.is_at(state) && is_at(state))
+    evaluate_again(state, through);
+  else
+    evaluate(state, false, through);
+}
+
+void PairStates::rub(const State& state, double damping) {
+  evaluate_again(state, step(-1, true, true, damping));
+}
+
+void PairStates::evaluate(const State& state, bool all, const contact_kernels::PairStep& step) {
   ++evaluations_;
   evaluated_builds_ = list_.builds();
   const std::span<const BodyMotion> motions = motion_to(state);
@@ -136,81 +145,128 @@ void PairStates::update(const State& state, bool all) {
     schedule_.wake_all();
   else
     schedule_.advance(motions);
-  find_points(state);
+  place_points(state, step.motions != nullptr);
   if (release_.known_parts() < surface_.body().parts.size()) find_initial_penetrations(state);
   const std::vector<double> before = release_.advance(state);
-  for (const std::uint32_t p : active_) is_active_[p] = states_[p].pressure > 0 ? kWasPressed : 0;
-  admit(evaluate_pairs());
   for (const std::uint32_t p : active_)
-    if (is_active_[p] == kWasPressed) is_active_[p] = 0;
-  active_.clear();
-  for (const std::uint32_t p : schedule_.awake())
-    if (is_active_[p]) active_.push_back(p);
+    if (is_active_[p] == kActive) is_active_[p] = 0;
+  const std::size_t steady = others_act_ ? 0 : acting_.size();
+  marks_.assign(steady + schedule_.awake().size(), 0);
+  lost_.resize(marks_.size());
+  const bool changed = evaluate_steady(step);
+  admit(evaluate_others(step), step);
+  choose_active(changed);
+  take_marks();
   release_.enter_energy(before, active_, states_, memory_);
 }
 
-// Of the pairs that are awake.
-void PairStates::find_points(const State& state) {
-  wanted_points_.clear();
-  const auto want = [&](std::uint32_t point) {
-    if (std::exchange(point_evaluation_[point], evaluations_) != evaluations_)
-      wanted_points_.push_back(point);
-  };
-  for (const std::uint32_t p : schedule_.awake()) {
-    const contact_kernels::PairSides& of = sides_[p];
-    want(of.i);
-    if (!of.of_plane) want(of.j);
+// The active pairs at the state that is evaluated.
+void PairStates::evaluate_again(const State& state, const contact_kernels::PairStep& step) {
+  cells_.want_none();
+  for (const std::uint32_t p : active_) {
+    cells_.want(sides_[p].i);
+    if (!sides_[p].of_plane) cells_.want(sides_[p].j);
   }
-  if (points_.empty()) return;
-  parallel_chunks(wanted_points_.size(), Batch::kMost, [&](std::size_t begin, std::size_t end) {
-    contact_kernel_table().place(cells_.points().data(), wanted_points_.data() + begin, end - begin,
-                                 state.displacement.data()->data(),
-                                 reinterpret_cast<double*>(points_.data()));
+  cells_.place(state, true);
+  marks_.assign(active_.size(), 0);
+  lost_.resize(marks_.size());
+  parallel_chunks(active_.size(), Batch::kMost, [&](std::size_t begin, std::size_t end) {
+    contact_kernels::PairStep own = step;
+    own.marks = marks_.data() + begin;
+    own.lost = lost_.data() + begin;
+    Batch batch;
+    for (std::size_t n = begin; n < end; ++n) add_to(batch, active_[n], static_cast<std::uint32_t>(n));
+    contact_kernel_table().evaluate(view(batch.pairs.data(), batch.count), batch.allowed.data(), own,
+                                    reinterpret_cast<double*>(states_.data()));
+    for (std::size_t n = begin; n < end && step.drift >= 0; ++n)
+      if (is_active_[active_[n]] != kSteady && memory_[active_[n]].soft > 0) schedule_.keep_awake(active_[n]);
   });
+  if (step.drift >= 0) choose_acting();
+  take_marks();
+}
+
+// In the order of the pairs.
+void PairStates::take_marks() {
+  stiffens_ = false;
+  for (std::size_t n = 0; n < marks_.size(); ++n) {
+    stiffens_ = stiffens_ || (marks_[n] & contact_kernels::kStiffens) != 0;
+    if (marks_[n] & contact_kernels::kHardens) hardened_ += lost_[n];
+  }
+}
+
+// Of the pairs that are steady or awake.
+void PairStates::place_points(const State& state, bool moving) {
+  cells_.want_none();
+  if (!others_act_)
+    for (const std::uint32_t point : acting_points_) cells_.want(point);
+  for (const std::uint32_t p : schedule_.awake()) {
+    if (is_active_[p] == kSteady) continue;
+    const contact_kernels::PairSides& of = sides_[p];
+    cells_.want(of.i);
+    if (!of.of_plane) cells_.want(of.j);
+  }
+  cells_.place(state, moving);
 }
 
 contact_kernels::PairView PairStates::view(const std::uint32_t* pairs, std::size_t count) const {
   return {pairs,
           count,
           sides_.data(),
-          reinterpret_cast<const char*>(&list_.pairs().front().properties.constants),
-          sizeof(ContactPair),
-          reinterpret_cast<const double*>(points_.data()),
+          reinterpret_cast<const double*>(list_.pairs().data()),
+          reinterpret_cast<const double*>(cells_.states().data()),
           reinterpret_cast<const double*>(planes_.data())};
+}
+
+// Whether any has ceased to press.
+bool PairStates::evaluate_steady(const contact_kernels::PairStep& step) {
+  if (others_act_) return false;
+  parallel_chunks(acting_.size(), Batch::kMost, [&](std::size_t begin, std::size_t end) {
+    contact_kernels::PairStep own = step;
+    own.marks = marks_.data() + begin;
+    own.lost = lost_.data() + begin;
+    contact_kernel_table().evaluate(view(acting_.data() + begin, end - begin), nullptr, own,
+                                    reinterpret_cast<double*>(states_.data()));
+  });
+  bool changed = false;
+  for (std::size_t n = 0; n < acting_.size(); ++n) {
+    if (evaluated_all_) schedule_.rest(acting_[n]);
+    if (marks_[n] & contact_kernels::kPresses) continue;
+    changed = true;
+    settle(acting_[n]);
+  }
+  return changed;
 }
 
 // Of the pairs that are awake. Returns (pairs; empty without release) 1 for those that come near inside each
 // other during a release; they are not evaluated yet.
-std::vector<std::uint8_t> PairStates::evaluate_pairs() {
+std::vector<std::uint8_t> PairStates::evaluate_others(const contact_kernels::PairStep& step) {
   const std::vector<std::uint32_t>& awake = schedule_.awake();
   std::vector<std::uint8_t> entering(release_.share_count() == 0 ? 0 : list_.pairs().size(), 0);
+  const std::size_t steady = marks_.size() - awake.size();
   parallel_chunks(awake.size(), Batch::kMost, [&](std::size_t begin, std::size_t end) {
     Batch batch;
-    std::array<std::uint32_t, Batch::kMost> others;
+    std::array<std::uint32_t, Batch::kMost> others, places;
     std::size_t count = 0;
     for (std::size_t n = begin; n < end; ++n) {
-      const std::uint32_t p = awake[n];
-      if (is_active_[p] != kWasPressed) {
-        others[count++] = p;
-        continue;
-      }
-      schedule_.keep_awake(p);  // it cannot sleep
-      add_to(batch, p);
+      if (is_active_[awake[n]] == kSteady) continue;
+      places[count] = static_cast<std::uint32_t>(steady + n);
+      others[count++] = awake[n];
     }
-    look_at({others.data(), count}, batch);
-    evaluate_batch(batch, entering);
+    look_at({others.data(), count}, {places.data(), count}, batch);
+    evaluate_batch(batch, step, &entering);
   });
   return entering;
 }
 
-void PairStates::add_to(Batch& batch, std::uint32_t pair) const {
+void PairStates::add_to(Batch& batch, std::uint32_t pair, std::uint32_t place) const {
   batch.allowed[batch.count] = release_.allowed(list_.pairs()[pair], memory_[pair]);
-  batch.soft[batch.count] = memory_[pair].soft;
+  batch.places[batch.count] = place;
   batch.pairs[batch.count++] = pair;
 }
 
 // Lets those sleep that can, and puts those in the batch that may be near.
-void PairStates::look_at(std::span<const std::uint32_t> pairs, Batch& batch) {
+void PairStates::look_at(std::span<const std::uint32_t> pairs, std::span<const std::uint32_t> places,
+                         Batch& batch) {
   if (pairs.empty()) return;
   std::array<double, Batch::kMost> pressed, path, turn;
   std::array<std::uint8_t, Batch::kMost> near;
@@ -230,7 +286,7 @@ void PairStates::look_at(std::span<const std::uint32_t> pairs, Batch& batch) {
     const bool sleeps =
         schedule_.sleep(p, watched && near[n] ? SafeMotion{0, 0} : SafeMotion{path[n], turn[n]});
     if (near[n] && (!sleeps || evaluated_all_)) {
-      add_to(batch, p);
+      add_to(batch, p, places[n]);
     } else if (!frozen_) {
       record.phase = near[n] ? PairPhase::approaching : PairPhase::separated;
       record.soft = 0;
@@ -238,24 +294,78 @@ void PairStates::look_at(std::span<const std::uint32_t> pairs, Batch& batch) {
   }
 }
 
-void PairStates::evaluate_batch(const Batch& batch, std::vector<std::uint8_t>& entering) {
+void PairStates::evaluate_batch(const Batch& batch, const contact_kernels::PairStep& step,
+                                std::vector<std::uint8_t>* entering) {
   if (batch.count == 0) return;
-  contact_kernel_table().evaluate(view(batch.pairs.data(), batch.count), batch.allowed.data(),
-                                  batch.soft.data(), reinterpret_cast<double*>(states_.data()));
+  std::array<std::uint8_t, Batch::kMost> marks;
+  std::array<double, Batch::kMost> lost;
+  contact_kernels::PairStep own = step;
+  own.marks = marks.data();
+  own.lost = lost.data();
+  contact_kernel_table().evaluate(view(batch.pairs.data(), batch.count), batch.allowed.data(), own,
+                                  reinterpret_cast<double*>(states_.data()));
   for (std::size_t n = 0; n < batch.count; ++n) {
     const std::uint32_t p = batch.pairs[n];
     const PairState& now = states_[p];
     const PairRecord& record = memory_[p];
-    const bool enters = is_active_[p] != kWasPressed && now.near && !now.deep && now.gap < 0 &&
-                        record.phase == PairPhase::separated && record.penetration == 0;
-    if (enters && release_.is_releasing(list_.pairs()[p]))
-      entering[p] = 1;
+    const bool enters = now.near && !now.deep && now.gap < 0 && record.phase == PairPhase::separated &&
+                        record.penetration == 0;
+    const bool waits = entering && enters && release_.is_releasing(list_.pairs()[p]);
+    if (waits)
+      (*entering)[p] = 1;
     else
       settle(p);
+    if (waits || !is_active_[p]) {
+      if (step.drift >= 0) memory_[p].slip = Vec3::Zero();
+      if (step.drift >= 0) memory_[p].soft = 0;
+      continue;
+    }
+    marks_[batch.places[n]] = marks[n];
+    lost_[batch.places[n]] = lost[n];
+    if (step.drift >= 0 && record.soft > 0)
+      schedule_.keep_awake(p);  // it presses sooner than it was judged by
   }
 }
 
-void PairStates::admit(const std::vector<std::uint8_t>& entering) {
+// Active pairs are the steady ones and those that are awake and near.
+void PairStates::choose_active(bool changed) {
+  active_.clear();
+  auto steady = acting_.cbegin();
+  const auto end = others_act_ ? steady : acting_.cend();
+  for (const std::uint32_t p : schedule_.awake()) {
+    if (is_active_[p] != kActive) continue;
+    for (; steady != end && *steady < p; ++steady)
+      if (is_active_[*steady] == kSteady) active_.push_back(*steady);
+    changed = changed || states_[p].pressure > 0;
+    active_.push_back(p);
+  }
+  for (; steady != end; ++steady)
+    if (is_active_[*steady] == kSteady) active_.push_back(*steady);
+  if (changed || others_act_) choose_acting();
+}
+
+void PairStates::choose_acting() {
+  const std::vector<std::uint32_t> before = std::exchange(acting_, {});
+  for (const std::uint32_t p : before)
+    if (is_active_[p] == kSteady) is_active_[p] = kActive;
+  for (const std::uint32_t p : active_)
+    if (states_[p].pressure > 0 || memory_[p].sticks()) acting_.push_back(p);
+  cells_.want_none();
+  acting_points_.clear();
+  for (const std::uint32_t p : acting_) {
+    if (!others_act_) {
+      is_active_[p] = kSteady;
+      schedule_.rest(p);
+    }
+    cells_.want(sides_[p].i);
+    if (!sides_[p].of_plane) cells_.want(sides_[p].j);
+  }
+  acting_points_ = cells_.wanted();
+  for (const std::uint32_t p : before)
+    if (is_active_[p] != kSteady) schedule_.wake(p);
+}
+
+void PairStates::admit(const std::vector<std::uint8_t>& entering, const contact_kernels::PairStep& step) {
   std::vector<std::uint32_t> pairs;
   std::vector<double> depths;
   for (std::uint32_t p = 0; p < entering.size(); ++p)
@@ -265,8 +375,12 @@ void PairStates::admit(const std::vector<std::uint8_t>& entering) {
     }
   if (pairs.empty()) return;
   release_.admit(pairs, depths, memory_);
-  for (const std::uint32_t p : pairs)
-    set(p, evaluate(list_.pairs()[p], release_.allowed(list_.pairs()[p], memory_[p]), memory_[p].soft));
+  for (std::size_t begin = 0; begin < pairs.size(); begin += Batch::kMost) {
+    Batch batch;
+    for (std::size_t n = begin; n < std::min(pairs.size(), begin + Batch::kMost); ++n)
+      add_to(batch, pairs[n], pairs[n]);  // all are awake: of what is released all pairs are looked at
+    evaluate_batch(batch, step, nullptr);
+  }
 }
 
 // In the first state; after an event, of the parts that have joined.
@@ -284,11 +398,6 @@ void PairStates::find_initial_penetrations(const State& state) {
         if (now.near && !now.deep) memory_[p].penetration = std::max(-now.gap, 0.0);
       },
       512);
-}
-
-void PairStates::set(std::size_t pair, const PairState& now) {
-  states_[pair] = now;
-  settle(pair);
 }
 
 // What a pair's new state means for its phase.
@@ -314,7 +423,7 @@ void PairStates::update_phase(const ContactPair& pair, PairState& now, PairPhase
   } else if (phase == PairPhase::separated) {
     const PairConstants& constants = pair.properties.constants;
     double entry = constants.law.hard;
-    if (points_[pair.i].shapeless || (!pair.of_plane() && points_[pair.j].shapeless))
+    if (points()[pair.i].shapeless || (!pair.of_plane() && points()[pair.j].shapeless))
       entry = pair.of_plane() ? 0 : kShapelessEntry * constants.width;
     phase = -now.gap > entry ? PairPhase::penetrated : PairPhase::approaching;
   }
@@ -322,62 +431,16 @@ void PairStates::update_phase(const ContactPair& pair, PairState& now, PairPhase
 }
 
 ContactSide PairStates::other_side(const ContactPair& pair) const {
-  if (!pair.of_plane()) return points_[pair.j].side;
+  if (!pair.of_plane()) return points()[pair.j].side;
   const ContactPlane& plane = settings_.planes[pair.plane];
-  const Vec3& from = points_[pair.i].side.position;
+  const Vec3& from = points()[pair.i].side.position;
   return {from - (from - plane.point).dot(plane.normal) * plane.normal, plane.normal, 1, 0};
 }
 
 ContactSide PairStates::own_side(const ContactPair& pair) const {
-  ContactSide from = points_[pair.i].side;
+  ContactSide from = points()[pair.i].side;
   if (pair.of_plane()) from.own_plane = 0;  // the plane's normal is the exact one
   return from;
-}
-
-Vec3 PairStates::velocity(std::uint32_t point, const State& state) const {
-  const InterpolationWeights& at = list_.point(point).at;
-  Vec3 sum = Vec3::Zero();
-  for (std::uint32_t a = 0; a < at.count; ++a) sum += at.weights[a] * state.velocity[at.elements[a]];
-  return sum;
-}
-
-// m, of the soft part of a pair in the steps to come, or 0: that of the law. A pair that will press within
-// kSoftSteps gets one as wide as its way in them, but does not press where it is. One that is pressed keeps its
-// own, for the energy it has stored is of that, and hardens slowly as it rests. It depends on the present state
-// alone, for which pairs sleep a run that goes on from a checkpoint need not know.
-double PairStates::softness_after(std::size_t p, const State& state, double drift) const {
-  const PairState& now = states_[p];
-  const ContactPair& pair = list_.pairs()[p];
-  const double least = pair.properties.constants.law.soft;
-  if (now.pressure > 0) {
-    const double soft = memory_[p].soft - kHardening * (memory_[p].soft - least);
-    return soft < kHardened * least ? 0 : soft;
-  }
-  Vec3 nearing = velocity(pair.i, state);
-  if (!pair.of_plane()) nearing -= velocity(pair.j, state);
-  const double way = kSoftSteps * drift * nearing.dot(now.normal);
-  if (now.gap > way) return 0;
-  const double most = std::min(least + 2 * std::max(now.gap, 0.0), kFarthestSoft * list_.point(pair.i).width);
-  return std::min(way, most) > least ? std::min(way, most) : 0;
-}
-
-void PairStates::finish_step(const State& state, double drift) {
-  lost_.assign(active_.size(), 0);
-  parallel_for_each(
-      active_.size(),
-      [&](std::size_t n) {
-        const std::uint32_t p = active_[n];
-        const double soft = softness_after(p, state, drift);
-        if (soft > 0) schedule_.keep_awake(p);  // it presses sooner than it was judged by
-        if (soft == memory_[p].soft) return;
-        memory_[p].soft = soft;
-        const double before = states_[p].energy;
-        const ContactPair& pair = list_.pairs()[p];
-        press(states_[p], own_side(pair), other_side(pair), pair.properties.constants.law.softened(soft));
-        lost_[n] = before - states_[p].energy;
-      },
-      512);
-  for (const double each : lost_) hardened_ += each;
 }
 
 }  // namespace flexel::simulate

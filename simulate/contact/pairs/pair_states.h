@@ -8,8 +8,12 @@
 
 namespace flexel::simulate {
 
-// Of this machine.
-[[nodiscard]] const contact_kernels::ContactTable& contact_kernel_table();
+// Of an active pair: N, on j; from i to j [m], of which `share` is where they meet. A row of
+// simulate/kernels/kernel_contact.h.
+struct alignas(64) PairRubbing {
+  Vec3 force = Vec3::Zero(), way = Vec3::Zero();
+  double share = 0;
+};
 
 class PairStates {
  public:
@@ -31,9 +35,23 @@ class PairStates {
     evaluated_builds_ = 0;  // the trial that was last evaluated counts from now on
   }
 
-  // After a step of `drift` s that led to `state`, which is evaluated: how softly pairs begin to press. What
-  // this changes is evaluated again: the states are those that a run which goes on from here would find.
-  void finish_step(const State& state, double drift);
+  // Likewise after a step of `drift` s that led to `state`, which changes how softly pairs begin to press (the states are
+  // those that a run which goes on from here would find) and, if they rub, slips; with a damping of `damping` s.
+  void go_through(const State& state, double drift, bool rubs, double damping);
+  // rubbing() in `state`, which is evaluated, by its velocities.
+  void rub(const State& state, double damping);
+  // Friction and damping of active pairs that do not stick, since the last of these two.
+  [[nodiscard]] const std::vector<PairRubbing>& rubbing() const { return rubbing_; }  // (pairs)
+  [[nodiscard]] PairRubbing& rubbing(std::size_t pair) { return rubbing_[pair]; }
+  // Active pairs that press or stick, ascending, and their points.
+  [[nodiscard]] const std::vector<std::uint32_t>& acting() const { return acting_; }
+  [[nodiscard]] const std::vector<std::uint32_t>& acting_points() const { return acting_points_; }
+  void choose_acting();  // anew, when others stick
+  // Whether pairs may act that do not press, or whose depths are released.
+  [[nodiscard]] bool others_act() const { return others_act_; }
+  // Whether any may be more than contact_kernels::kStiffening times as stiff as in the linear range.
+  [[nodiscard]] bool stiffens() const { return stiffens_; }
+
   // J, that pairs have lost as they hardened.
   [[nodiscard]] double hardened() const { return hardened_; }
   void set_hardened(double energy) { hardened_ = energy; }
@@ -43,8 +61,10 @@ class PairStates {
   [[nodiscard]] bool is_at(const State& state) const;
   [[nodiscard]] const CarryingCells& cells() const { return cells_; }
   [[nodiscard]] std::uint64_t evaluations() const { return evaluations_; }
-  [[nodiscard]] const std::vector<PointState>& points() const { return points_; }  // (PairList::points())
-  [[nodiscard]] const std::vector<PairState>& states() const { return states_; }   // (pairs)
+  [[nodiscard]] const std::vector<PointState>& points() const {
+    return cells_.states();
+  }                                                                               // (PairList::points())
+  [[nodiscard]] const std::vector<PairState>& states() const { return states_; }  // (pairs)
   [[nodiscard]] const PairState& operator[](std::size_t pair) const { return states_[pair]; }
   // Evaluated pairs whose state is `near`, ascending: most candidates are not.
   [[nodiscard]] const std::vector<std::uint32_t>& active() const { return active_; }
@@ -55,29 +75,33 @@ class PairStates {
  private:
   [[nodiscard]] std::span<const BodyMotion> motion_to(const State& state);
   [[nodiscard]] Box body_box(std::size_t body) const;
-  void find_points(const State& state);
   // The numbers of pairs that are evaluated together, and what they are evaluated with.
   struct Batch {
     static constexpr std::size_t kMost = 256;
-    std::array<std::uint32_t, kMost> pairs;
-    std::array<double, kMost> allowed, soft;
+    std::array<std::uint32_t, kMost> pairs, places;  // places: in awake pairs
+    std::array<double, kMost> allowed;
     std::size_t count = 0;
   };
-  void look_at(std::span<const std::uint32_t> pairs, Batch& batch);
-  void add_to(Batch& batch, std::uint32_t pair) const;
-  void evaluate_batch(const Batch& batch, std::vector<std::uint8_t>& entering);
+  [[nodiscard]] contact_kernels::PairStep step(double drift, bool moving, bool rubs, double damping);
+  void evaluate(const State& state, bool all, const contact_kernels::PairStep& step);
+  void evaluate_again(const State& state, const contact_kernels::PairStep& step);
+  void place_points(const State& state, bool moving);
+  [[nodiscard]] bool evaluate_steady(const contact_kernels::PairStep& step);
+  void look_at(std::span<const std::uint32_t> pairs, std::span<const std::uint32_t> places, Batch& batch);
+  void add_to(Batch& batch, std::uint32_t pair, std::uint32_t place) const;
+  void evaluate_batch(const Batch& batch, const contact_kernels::PairStep& step,
+                      std::vector<std::uint8_t>* entering);
+  void choose_active(bool changed);
+  void take_marks();
   [[nodiscard]] ContactSide other_side(const ContactPair& pair) const;
   [[nodiscard]] ContactSide own_side(const ContactPair& pair) const;
   // `allowed` [m]: penetration without pressure; `soft` [m]: of PairRecord.
   [[nodiscard]] PairState evaluate(const ContactPair& pair, double allowed, double soft) const {
     return pair_state(own_side(pair), other_side(pair), pair.properties.constants, allowed, soft);
   }
-  [[nodiscard]] Vec3 velocity(std::uint32_t point, const State& state) const;
-  [[nodiscard]] double softness_after(std::size_t pair, const State& state, double drift) const;
   void find_initial_penetrations(const State& state);
-  [[nodiscard]] std::vector<std::uint8_t> evaluate_pairs();
-  void admit(const std::vector<std::uint8_t>& entering);
-  void set(std::size_t pair, const PairState& now);
+  [[nodiscard]] std::vector<std::uint8_t> evaluate_others(const contact_kernels::PairStep& step);
+  void admit(const std::vector<std::uint8_t>& entering, const contact_kernels::PairStep& step);
   void settle(std::size_t pair);
   void update_phase(const ContactPair& pair, PairState& now, PairPhase& phase) const;
 
@@ -90,20 +114,23 @@ class PairStates {
   CarryingCells cells_;
   std::vector<contact_kernels::PairSides> sides_;  // (pairs)
   std::vector<ContactSide> planes_;                // (settings_.planes)
-  std::vector<std::uint32_t> wanted_points_;       // of the evaluation
-  std::vector<PointState> points_;                 // of pairs that are awake
-  std::vector<std::uint64_t> point_evaluation_;    // (points_) that they are of
   std::vector<PairState> states_;                  // of active pairs
-  std::vector<std::uint32_t> active_;
-  static constexpr std::uint8_t kWasPressed = 2;  // in the evaluation before, while pairs are evaluated
-  std::vector<std::uint8_t> is_active_;           // (pairs)
-  std::vector<Vec3> moved_from_;  // (PairList::elements()) m, displacements of the last evaluation
-  std::vector<Vec3> moves_;       // likewise, from those before
-  std::vector<WideBox> of_body_;  // (parts) of moves_
+  std::vector<PairRubbing> rubbing_;               // likewise
+  std::vector<std::uint32_t> active_, acting_;
+  std::vector<std::uint32_t> acting_points_;
+  // Pairs that press stay so from step to step, mostly: acting_ of a list without others is evaluated by itself.
+  bool others_act_ = false;                                // what may stick, or is released
+  static constexpr std::uint8_t kActive = 1, kSteady = 2;  // kSteady: of those
+  std::vector<std::uint8_t> is_active_;                    // (pairs)
+  // What an evaluation says of the steady pairs and, behind them, of those that are awake.
+  std::vector<std::uint8_t> marks_;  // contact_kernels::kPresses and so on
+  std::vector<double> lost_;         // J, where kHardens
+  std::vector<Vec3> moved_from_;     // (PairList::elements()) m, displacements of the last evaluation
+  std::vector<Vec3> moves_;          // likewise, from those before
+  std::vector<WideBox> of_body_;     // (parts) of moves_
   std::vector<BodyMotion> motions_;
-  std::vector<double> lost_;  // (active_) J, of finish_step()
   std::uint64_t evaluated_builds_ = 0, evaluations_ = 0;
-  bool evaluated_all_ = false, frozen_ = false;
+  bool evaluated_all_ = false, frozen_ = false, stiffens_ = true;
   double hardened_ = 0;  // J
 };
 

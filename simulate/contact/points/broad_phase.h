@@ -31,7 +31,8 @@ class CubeOrder {
   [[nodiscard]] std::size_t size() const { return points_.size(); }
   [[nodiscard]] std::uint32_t point(std::size_t place) const { return points_[place]; }
 
-  // visit(a, b) for the places a of [begin, end) and those b of all points in the 27 cubes around that of a.
+  // visit(a, b, c) for the places a of [begin, end) and those [b, c) of points in the 27 cubes around that of a, a row of
+  // cubes at a time; done(a) after them.
   template <class Visit, class Done>
   void visit_near(std::size_t begin, std::size_t end, const Visit& visit, const Done& done) const;
 
@@ -61,7 +62,7 @@ void CubeOrder::visit_near(std::size_t begin, std::size_t end, const Visit& visi
         while (rows[r].last < size() && keys_[rows[r].last] < from + 3) ++rows[r].last;
       }
     for (const Row& row : rows)
-      for (std::size_t b = row.first; b < row.last; ++b) visit(a, b);
+      if (row.first < row.last) visit(a, row.first, row.last);
     done(a);
   }
 }
@@ -71,20 +72,33 @@ template <class Keep>
 [[nodiscard]] Neighbours neighbours_within(const std::vector<Vec3>& points, double reach, const Keep& keep) {
   const CubeOrder order(points, reach);
   std::vector<Vec3> sorted(points.size());
-  parallel_for_each(points.size(), [&](std::size_t a) { sorted[a] = points[order.point(a)]; });
+  std::vector<std::uint32_t> number(points.size());
+  parallel_for_each(points.size(), [&](std::size_t a) {
+    number[a] = order.point(a);
+    sorted[a] = points[number[a]];
+  });
   constexpr std::size_t kGrain = 2048;
   std::vector<std::vector<std::uint32_t>> found((points.size() + kGrain - 1) / kGrain);
   Neighbours result;
   result.offsets.assign(points.size() + 1, 0);
   parallel_chunks(points.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     std::vector<std::uint32_t>& own = found[begin / kGrain];
+    std::vector<std::uint32_t> near;
     std::size_t first = 0;
     order.visit_near(
         begin, end,
-        [&](std::size_t a, std::size_t b) {
-          if ((sorted[b] - sorted[a]).squaredNorm() > reach * reach) return;
-          const std::uint32_t i = order.point(a), j = order.point(b);
-          if (j > i && keep(i, j)) own.push_back(j);
+        [&](std::size_t a, std::size_t row, std::size_t behind) {
+          // without branches, which nothing could foretell
+          near.resize(std::max(near.size(), behind - row));
+          std::size_t count = 0;
+          const std::uint32_t i = number[a];
+          for (std::size_t b = row; b < behind; ++b) {
+            near[count] = number[b];
+            count += static_cast<std::size_t>((sorted[b] - sorted[a]).squaredNorm() <= reach * reach) &
+                     static_cast<std::size_t>(number[b] > i);
+          }
+          for (std::size_t n = 0; n < count; ++n)
+            if (keep(i, near[n])) own.push_back(near[n]);
         },
         [&](std::size_t a) {
           std::sort(own.begin() + static_cast<std::ptrdiff_t>(first), own.end());

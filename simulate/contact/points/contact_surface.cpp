@@ -74,6 +74,10 @@ void ContactSurface::find_cells() {
   }
 }
 
+std::optional<std::uint32_t> ContactSurface::cell(std::uint32_t point) const {
+  return cell_[point] != kNoCarrier ? std::optional(cell_[point]) : std::nullopt;
+}
+
 bool ContactSurface::broken(std::uint32_t point) const {
   return cell_[point] != kNoCarrier && body_.broken[cell_[point]] != 0;
 }

@@ -57,7 +57,9 @@ class ContactSurface {
   [[nodiscard]] CellShape shape_at(std::uint32_t point, const Mat3& gradient) const;
   // `displacement` [m] of the point.
   [[nodiscard]] PointState at(std::uint32_t point, const Vec3& displacement, const CellShape& shape) const;
-  [[nodiscard]] bool broken(std::uint32_t point) const;  // the cell that carries it
+  // That carries it; nothing: none of eight corners does.
+  [[nodiscard]] std::optional<std::uint32_t> cell(std::uint32_t point) const;
+  [[nodiscard]] bool broken(std::uint32_t point) const;  // that cell
   // Of those that carry points.
   [[nodiscard]] std::size_t broken_cells() const;
 
