@@ -89,6 +89,11 @@ CellStiffness::CellStiffness(const Problem& problem, const StiffnessPattern& pat
   }
 }
 
+void CellStiffness::renew_pattern_of(const std::vector<ActiveEffect>& effects) {
+  added_ = matrix_of_effects(body_, pattern_.matrix, effects);
+  adding_.reset();
+}
+
 // The columns of one lane.
 void CellStiffness::prepare_lane(std::uint32_t cell, const State& state, const TangentOptions& tangent,
                                  double* to) const {
@@ -255,6 +260,8 @@ void CellStiffness::multiply(const double* x, double* y) const {
       Eigen::Map<Vec3>(y + 3 * std::size_t{elements[ab / 8]}) +=
           each.blocks[ab] * Eigen::Map<const Vec3>(from + 3 * std::size_t{elements[ab % 8]});
   }
+  if (!inertia_.empty())
+    parallel_for_each(3 * inertia_.size(), [&](std::size_t k) { y[k] += inertia_[k / 3] * from[k]; });
   if (!adding_) adding_ = adding();
   parallel_for_each(adding_->rows.size(), [&](std::size_t r) {
     Vec3 sum = Vec3::Zero();
@@ -370,6 +377,8 @@ const Block* CellStiffness::blocks(std::size_t begin, std::size_t end, std::vect
         if (const FoldTangent* blocks = folding_of(at.cell))
           for (std::size_t b = 0; b < 8; ++b)
             row[pattern_.stencil.slot[at.cell][8 * at.corner + b]] += (*blocks)[8 * at.corner + b];
+    if (!inertia_.empty())
+      row[diagonal_position(pattern_.matrix, e) - row_offsets()[e]].diagonal().array() += inertia_[e];
     add_effects(e, row);
     if (!mask_.empty()) eliminate_row(e, row);
   }
@@ -389,6 +398,7 @@ std::vector<Block> CellStiffness::diagonal() const {
     if (!folding_.empty())
       for (const Incidence& at : pattern_.stencil.of(static_cast<std::uint32_t>(e)))
         if (const FoldTangent* blocks = folding_of(at.cell)) diagonal[e] += (*blocks)[9 * at.corner];
+    if (!inertia_.empty()) diagonal[e].diagonal().array() += inertia_[e];
     if (added_.row_offsets[e + 1] > added_.row_offsets[e])
       diagonal[e] += added_.values[diagonal_position(added_, e)];
     if (!mask_.empty() && mask_[e])

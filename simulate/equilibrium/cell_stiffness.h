@@ -26,6 +26,10 @@ class CellStiffness final : public LinearOperator {
 
   // Takes up the cells' tangents at `state`, nothing added and nothing eliminated.
   void linearise(const State& state, const TangentOptions& tangent);
+  // kg/s^2 (elements), that resist every motion of the elements; empty: none. Stays until it is given again.
+  void set_inertia(std::vector<double> inertia) { inertia_ = std::move(inertia); }
+  // What effects add to has changed.
+  void renew_pattern_of(const std::vector<ActiveEffect>& effects);
   // What effects add: rows and columns of the elements that they pull at, and of their neighbours. Zero after
   // linearise().
   [[nodiscard]] BlockMatrix& added() {
@@ -94,6 +98,7 @@ class CellStiffness final : public LinearOperator {
   step::TangentForm form_ = step::TangentForm::at_rest;
   std::vector<double> tangents_;  // by block: columns of kLanes
   std::vector<Folding> folding_;  // ascending
+  std::vector<double> inertia_;   // (elements) or empty
   BlockMatrix added_;
   mutable std::optional<Adding> adding_;               // made by the first product
   std::vector<std::uint8_t> mask_;                     // (elements) prescribed components; empty: none

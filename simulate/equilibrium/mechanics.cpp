@@ -56,7 +56,8 @@ Mechanics::Lattice::Lattice(const Problem& problem, const PaperModel& paper,
   made.emplace(problem, pattern, effects);
   const State rest{std::vector<Vec3>(problem.body.element_count(), Vec3::Zero()), 1};
   try {
-    for (const ActiveEffect& effect : effects) effect->add_stiffness(rest, made->added());
+    for (const ActiveEffect& effect : effects)
+      if (!effect->tells_where_it_pulls()) effect->add_stiffness(rest, made->added());
   } catch (const MissingBlock&) {
     made.reset();
     pattern.matrix.values.assign(pattern.matrix.columns.size(), Block::Zero());
@@ -182,7 +183,22 @@ void Mechanics::assemble(const State& state, const TangentOptions& tangent) {
     const ScopeTimer timer(paper_seconds_);
     paper_.add_stiffness(state, tangent.project, lattice().pattern.matrix);
   }
-  for (const ActiveEffect& effect : effects_) effect->add_stiffness(state, lattice().added());
+  for (std::size_t e = 0; e < inertia_.size(); ++e)
+    lattice().added().values[diagonal_position(lattice().added(), e)].diagonal().array() += inertia_[e];
+  for (const ActiveEffect& effect : effects_)
+    tangent.project ? effect->add_positive_stiffness(state, lattice().added())
+                    : effect->add_stiffness(state, lattice().added());
+}
+
+void Mechanics::set_inertia(std::vector<double> inertia) {
+  if (lattice().made)
+    lattice().made->set_inertia(std::move(inertia));
+  else
+    inertia_ = std::move(inertia);
+}
+
+void Mechanics::renew_effects_pattern() {
+  if (lattice().made) lattice().made->renew_pattern_of(effects_);
 }
 
 void Mechanics::eliminate_prescribed() {

@@ -95,6 +95,10 @@ class Mechanics {
   // Tangent stiffness into tangent(), prescribed components not yet eliminated.
   void assemble(const State& state, const TangentOptions& tangent = {});
   void eliminate_prescribed();
+  // kg/s^2 (elements): from here on tangents hold what inertia resists in an implicit step.
+  void set_inertia(std::vector<double> inertia);
+  // Effects add to other elements than they did, of the same cells or couples.
+  void renew_effects_pattern();
   // Of the tangent only what effects add is made anew, at `state`; what was eliminated stays so. False, and nothing has
   // changed, where that is stored together with the rest, or a load follows the shape.
   [[nodiscard]] bool renew_effects(const State& state);
@@ -153,8 +157,9 @@ class Mechanics {
   std::shared_ptr<CellsElsewhere> elsewhere_;  // null: all is done here
   Constraints constraints_;
   std::optional<FollowedTangent> followed_;
-  State linearised_;       // of the last assemble(), where loads follow
-  double free_scale_ = 0;  // N, the norm of the forces that free strain makes at rest
+  std::vector<double> inertia_;  // of set_inertia(), where the tangent is stored
+  State linearised_;             // of the last assemble(), where loads follow
+  double free_scale_ = 0;        // N, the norm of the forces that free strain makes at rest
   double cell_seconds_ = 0, paper_seconds_ = 0;
 };
 

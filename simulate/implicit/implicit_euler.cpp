@@ -45,10 +45,26 @@ void ImplicitEuler::make_mechanics() {
   forget();
   if (mechanics_)
     for (std::size_t p = 0; p < effects_.size(); ++p) seconds_[p] += mechanics_->effects()[p].seconds;
-  mechanics_.emplace(problem_, all_effects(), StiffnessStorage::stored);
+  mechanics_.emplace(problem_, all_effects(), storage());
+  inertia_of_ = 0;
   coupled_ = mechanics_->coupled_elements();
   std::sort(coupled_.begin(), coupled_.end());
   if (damped_) damping_matrix_ = mechanics_->stiffness();
+}
+
+// The damping matrix, and what resists velocity, have places only beside stored cells.
+StiffnessStorage ImplicitEuler::storage() const {
+  const bool resists = std::any_of(effects_.begin(), effects_.end(),
+                                   [](const ActiveEffect& effect) { return effect->resists(); });
+  return damped_ || resists || !CellStiffness::fits(problem_, PaperModel(problem_)) ? StiffnessStorage::stored
+                                                                                    : StiffnessStorage::made;
+}
+
+void ImplicitEuler::set_inertia() {
+  inertia_of_ = step_;
+  std::vector<double> inertia(mass_.size());
+  for (std::size_t e = 0; e < inertia.size(); ++e) inertia[e] = mass_[e] / (step_ * step_);
+  mechanics_->set_inertia(std::move(inertia));
 }
 
 // An effect of the run as the mechanics of a step sees it: one that resists velocity has that of the step.
@@ -62,6 +78,8 @@ class ImplicitEuler::EffectOfStep : public Effect {
   }
   [[nodiscard]] bool follows() const override { return effect_->follows(); }
   [[nodiscard]] std::vector<CoupledElements> couples() const override { return effect_->couples(); }
+  [[nodiscard]] std::vector<std::uint32_t> may_pull_at() const override { return effect_->may_pull_at(); }
+  [[nodiscard]] bool tells_where_it_pulls() const override { return effect_->tells_where_it_pulls(); }
   void constrain(Constraints& constraints) override {
     effect_->constrain(constraints);
     effect_->constrain_implicit_steps(constraints);
@@ -78,6 +96,9 @@ class ImplicitEuler::EffectOfStep : public Effect {
     effect_->resists() ? effect_->add_resistance(euler_->along_the_way(state), 1 / euler_->step_, matrix)
                        : effect_->add_stiffness(state, matrix);
   }
+  void add_positive_stiffness(const State& state, BlockMatrix& matrix) override {
+    effect_->resists() ? add_stiffness(state, matrix) : effect_->add_positive_stiffness(state, matrix);
+  }
   void add_force_change(const State& state, const std::vector<Vec3>& change, bool transposed,
                         std::vector<Vec3>& forces) override {
     effect_->add_force_change(state, change, transposed, forces);
@@ -93,7 +114,6 @@ class ImplicitEuler::Inertia : public Effect {
   static constexpr const char* name = "inertia";
   explicit Inertia(const ImplicitEuler& euler) : euler_(&euler) {}
   [[nodiscard]] std::string why() const override { return "implicit steps"; }
-  [[nodiscard]] bool adds_stiffness() const override { return true; }
   [[nodiscard]] double energy(const State& state) override {
     const double step = euler_->step_;
     return 0.5 / (step * step) * parallel_sum<double>(euler_->mass_.size(), [&](std::size_t e) {
@@ -104,12 +124,6 @@ class ImplicitEuler::Inertia : public Effect {
     const double step = euler_->step_;
     parallel_for_each(euler_->mass_.size(), [&](std::size_t e) {
       forces[e] -= euler_->mass_[e] / (step * step) * (state.displacement[e] - euler_->target_[e]);
-    });
-  }
-  void add_stiffness(const State&, BlockMatrix& matrix) override {
-    const double step = euler_->step_;
-    parallel_for_each(euler_->mass_.size(), [&](std::size_t e) {
-      matrix.values[diagonal_position(matrix, e)].diagonal().array() += euler_->mass_[e] / (step * step);
     });
   }
 
@@ -246,8 +260,12 @@ std::optional<double> ImplicitEuler::begin(const State& state, double end, doubl
     if (share * step_ < shortest || look == kLooks) return std::nullopt;
     end = *state.time + share * step_;
   }
-  if (recouples && !covers_couples()) make_mechanics();
+  if (recouples && !covers_couples())
+    make_mechanics();
+  else if (recouples)
+    mechanics_->renew_effects_pattern();
   if (std::abs(step_ - previous) > kSameStep * previous) forget();
+  if (std::abs(step_ - inertia_of_) > kSameStep * inertia_of_) set_inertia();
   return end;
 }
 
