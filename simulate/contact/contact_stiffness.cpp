@@ -127,15 +127,16 @@ class Assembly {
       turning[a] = sum.turning.dot(of.across[a]);
       leaning[a] = n.dot(of.slopes[a]);
     }
+    std::array<Mat3, 64> blocks;
     for (std::uint32_t a = 0; a < count; ++a)
       for (std::uint32_t b = 0; b < count; ++b) {
         const double wa = of.at->weights[a], wb = of.at->weights[b];
         const double both = of.across[a].dot(bent[b]) - leaning[a] * turning[b] - leaning[b] * turning[a];
         const Vec3 left = turning[a] * of.slopes[b] - wa * tilted[b] + both * n;
         const Vec3 right = turning[b] * of.slopes[a] - wb * tilted[a];
-        add(of.at->elements[a], of.at->elements[b],
-            wa * wb * sum.by_place + left * n.transpose() + n * right.transpose());
+        blocks[8 * a + b] = wa * wb * sum.by_place + left * n.transpose() + n * right.transpose();
       }
+    add_blocks(*of.at, blocks, matrix_);
   }
 
   // What moves or turns i changes at j.
@@ -166,6 +167,22 @@ class Assembly {
 };
 
 }  // namespace
+
+// Elements of a cell ascend, mostly: each is looked for behind the last one.
+void add_blocks(const InterpolationWeights& at, const std::array<Mat3, 64>& blocks, BlockMatrix& matrix) {
+  for (std::uint32_t a = 0; a < at.count; ++a) {
+    const std::uint64_t begin = matrix.row_offsets[at.elements[a]],
+                        end = matrix.row_offsets[at.elements[a] + 1];
+    std::uint64_t place = begin;
+    for (std::uint32_t b = 0; b < at.count; ++b) {
+      if (b > 0 && at.elements[b] < at.elements[b - 1]) place = begin;
+      while (place < end && matrix.columns[place] < at.elements[b]) ++place;
+      if (place == end || matrix.columns[place] != at.elements[b])
+        throw MissingBlock("no block between elements that carry a contact point");
+      matrix.values[place] += blocks[8 * a + b];
+    }
+  }
+}
 
 void add_contact_stiffness(const ContactSurface& surface, const PairList& list, const PairStates& states,
                            ContactTangent kind, BlockMatrix& matrix) {

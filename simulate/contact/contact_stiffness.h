@@ -29,4 +29,7 @@ enum class ContactTangent { whole, positive };
 void add_contact_stiffness(const ContactSurface& surface, const PairList& list, const PairStates& states,
                            ContactTangent kind, BlockMatrix& matrix);
 
+// Adds block 8 a + b between the elements a and b that carry a point.
+void add_blocks(const InterpolationWeights& at, const std::array<Mat3, 64>& blocks, BlockMatrix& matrix);
+
 }  // namespace flexel::simulate

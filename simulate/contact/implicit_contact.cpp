@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "simulate/contact/contact_stiffness.h"
+
 namespace flexel::simulate {
 namespace {
 
@@ -164,10 +166,7 @@ void ImplicitContact::add_friction_stiffness(const State& trial, BlockMatrix& ma
   std::array<Mat3, 64> sum;
   const InterpolationWeights* summed = nullptr;
   const auto flush = [&] {
-    if (!summed) return;
-    for (std::uint32_t a = 0; a < summed->count; ++a)
-      for (std::uint32_t b = 0; b < summed->count; ++b)
-        matrix.values[position_of(matrix, summed->elements[a], summed->elements[b])] += sum[8 * a + b];
+    if (summed) add_blocks(*summed, sum, matrix);
     summed = nullptr;
   };
   for (const Rubbing& pair : rubbing_) {

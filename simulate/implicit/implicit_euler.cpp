@@ -18,6 +18,9 @@ constexpr double kShortest = 1.0 / 1024;  // of a step
 constexpr int kFullIterations = 12;
 // Elements: contact changes the tangent in every iteration, and a factorisation is dearer than a hierarchy.
 constexpr std::size_t kDirectRowsTouching = 100;
+// Of a step of Newton's method, relative, under which the cells' tangent serves
+// for the next one: what contact does changes more.
+constexpr double kKeepCellsBelow = 0.1;
 constexpr int kPasses = 12;            // of Newton's method, until what is held fixed in it suits
 constexpr int kLooks = 40;             // at a step, each at a shorter one, until effects bear it
 constexpr double kBorneWhole = 0.999;  // share that needs no other look
@@ -206,6 +209,7 @@ bool ImplicitEuler::solve(State& trial, NewtonSteps steps,
   if (steps == NewtonSteps::full) options.max_iterations = kFullIterations;
   options.least_scale = force_scale();
   if (touches_) options.direct.rows = kDirectRowsTouching;
+  options.keep_cells_below = kKeepCellsBelow;
   for (int pass = 0; pass < kPasses; ++pass) {
     const NewtonOutcome outcome = newton(
         *mechanics_, trial, options, [&](double, const std::string& note) { progress(note); }, &memory_);
@@ -214,7 +218,11 @@ bool ImplicitEuler::solve(State& trial, NewtonSteps steps,
     told.trouble = outcome.trouble;
     if (!outcome.converged) return false;
     if (!settles(trial)) continue;
-    if (std::isfinite(mechanics_->energy(trial))) return true;
+    Forces found = mechanics_->forces(trial);
+    if (mechanics_->is_sound(trial, found)) {
+      supports_ = std::move(found.total);
+      return true;
+    }
     told.trouble = "surfaces pass through one another within the step";
     return false;
   }
@@ -301,7 +309,6 @@ bool ImplicitEuler::attempt(State& state, const std::function<void(const std::st
     moved_[e] = trial.displacement[e] - before_.displacement[e];
     trial.velocity[e] = moved_[e] / step;
   });
-  supports_ = mechanics_->forces(trial).total;
   parallel_for_each(mass_.size(), [&](std::size_t e) {
     for (int axis = 0; axis < 3; ++axis)
       supports_[e][axis] = mechanics_->constraints().mask[e] >> axis & 1 ? -supports_[e][axis] : 0;
