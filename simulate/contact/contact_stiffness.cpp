@@ -7,6 +7,9 @@ namespace {
 // Of a pair, by d and b: N/m, N, N m.
 struct PairCurvature {
   Mat3 by_d = Mat3::Zero(), by_both = Mat3::Zero(), by_b = Mat3::Zero();
+  // Of c together with d and with b, along these; of c alone [J].
+  Vec3 facing_d = Vec3::Zero(), facing_b = Vec3::Zero();
+  double facing = 0;
 };
 
 PairCurvature curvature_of(const PairState& now, ContactTangent kind) {
@@ -35,6 +38,11 @@ PairCurvature curvature_of(const PairState& now, ContactTangent kind) {
               mixed * (of_b * slide.transpose() + slide * of_b.transpose()) +
               narrowing * slide * slide.transpose() +
               press * tilt * tilt * (n * t.transpose() + t * n.transpose() + s * across);
+  const double by_gap = -now.facing_slope * now.pressure / now.weight;            // U_sc
+  const double by_offset = -now.narrowing * now.facing_slope / now.weight * law;  // U_Tc
+  made.facing_d = by_gap * n + by_offset * t;
+  made.facing_b = by_gap * of_b + by_offset * slide;
+  made.facing = now.facing_slope * law;
   return made;
 }
 
@@ -69,8 +77,10 @@ class Assembly {
         return kind == ContactTangent::whole ? now.turning[static_cast<std::size_t>(side)]
                                              : Vec3(Vec3::Zero());
       };
-      if (at_i) gather(pair.i, of, turning(0));
-      if (at_j) gather(pair.j, of, turning(1));
+      // A plane alone gives the direction of its pairs.
+      const Vec3 other = pair.of_plane() ? Vec3(-now.normal) : normal(pair.j);
+      if (at_i) gather(pair.i, pair.of_plane() ? 0 : own_plane(pair.i), of, turning(0), -1, -other);
+      if (at_j) gather(pair.j, own_plane(pair.j), of, turning(1), 1, -normal(pair.i));
       if (at_i && at_j) add_cross(pair, of);
     }
     for (std::size_t n = 0; n < points_.size(); ++n) add_point(carried(points_[n]), sums_[n]);
@@ -81,18 +91,23 @@ class Assembly {
 
   [[nodiscard]] bool deforms(std::uint32_t point) const { return !surface_.rigid(list_.point(point).part); }
 
-  // At i d' = -x', b' = a n'; at j the other way round, which is the same to second order.
-  void gather(std::uint32_t point, const PairCurvature& of, const Vec3& turning) {
+  [[nodiscard]] const Vec3& normal(std::uint32_t point) const { return states_.points()[point].side.normal; }
+
+  [[nodiscard]] double own_plane(std::uint32_t point) const { return states_.points()[point].side.own_plane; }
+
+  // At i d' = -x', b' = a n'; at j d' = x', b' = -a n' (`sign` -1, 1). c' = facing . n'.
+  void gather(std::uint32_t point, double own, const PairCurvature& of, const Vec3& turning, int sign,
+              const Vec3& facing) {
     if (number_[point] == kNone) {
       number_[point] = static_cast<std::uint32_t>(points_.size());
       points_.push_back(point);
       sums_.emplace_back();
     }
-    const double own = states_.points()[point].side.own_plane;
     PointCurvature& sum = sums_[number_[point]];
     sum.by_place += of.by_d;
-    sum.by_both -= own * of.by_both;
-    sum.by_normal += own * own * of.by_b;
+    sum.by_both += sign * of.facing_d * facing.transpose() - own * of.by_both;
+    const Mat3 faces = -sign * own * of.facing_b * facing.transpose();
+    sum.by_normal += own * own * of.by_b + faces + faces.transpose();
     sum.turning += turning;
   }
 
@@ -142,11 +157,13 @@ class Assembly {
   // What moves or turns i changes at j.
   void add_cross(const ContactPair& pair, const PairCurvature& of) {
     const Carried i = carried(pair.i), j = carried(pair.j);
-    const double own_i = states_.points()[pair.i].side.own_plane,
-                 own_j = states_.points()[pair.j].side.own_plane;
+    const double own_i = own_plane(pair.i), own_j = own_plane(pair.j);
     // by x_i and x_j, x_i and n_j, n_i and x_j, n_i and n_j
-    const Mat3 places = -of.by_d, to_normal = own_j * of.by_both,
-               from_normal = own_i * of.by_both.transpose(), normals = -own_i * own_j * of.by_b;
+    const Mat3 places = -of.by_d;
+    const Mat3 to_normal = own_j * of.by_both + of.facing_d * i.normal.transpose();
+    const Mat3 from_normal = own_i * of.by_both.transpose() - j.normal * of.facing_d.transpose();
+    const Mat3 normals = own_j * j.normal * of.facing_b.transpose() - own_i * own_j * of.by_b -
+                         own_i * of.facing_b * i.normal.transpose() - of.facing * Mat3::Identity();
     for (std::uint32_t a = 0; a < i.at->count; ++a)
       for (std::uint32_t b = 0; b < j.at->count; ++b) {
         const double wa = i.at->weights[a], wb = j.at->weights[b];

@@ -5,7 +5,8 @@
 // and s and T change by
 //     s' = n . d' + t . b' / L,   s'' = 2 d' . P b' / L - (2 (n . b') (t . b') + s |P b'|^2) / L^2,   P = I - n n^T,
 //     T' = t . d' - s t . b' / L, T'' = |d'|^2 - s'^2 - s s''.
-// Left out is how the facing of the normals changes the weight beyond its share of the turning: faces that meet face fully.
+// c = -n_i . n_j, by which a weight grows as two normals come to face each other, has c' = -n_j . n_i' - n_i . n_j' and
+// c'' = -2 n_i' . n_j' beside what n'' adds; left out is the second derivative of the weight by c, which goes with the energy alone.
 //
 // A normal n ~ F^-T N of a cell with h_a = F^-T g_a (g_a: gradients of the weights) and m_a = (I - n n^T) h_a follows its elements by
 //     n' = -sum m_a (n . u_a),
