@@ -126,6 +126,10 @@ CellStiffness::Evaluation CellStiffness::run_kernels(bool energy) {
   const step::Composition has{energy ? step::Damping::book : step::Damping::none, false, energy};
   work_.damping.resize(energy ? 3 * work_.places.size() : 0);
   work_.shared_damping.resize(energy ? shared_force_.size() : 0);
+  // The kernels that tell the energy break cells that have turned inside out.
+  std::vector<step::CellBlock> breakable;
+  if (energy) breakable = layout_.blocks;
+  step::CellBlock* const blocks = energy ? breakable.data() : layout_.blocks.data();
   const step::StateView view{work_.places.data()->data(), work_.pulls.data()->data(), nullptr,
                              work_.ones.data(), energy ? work_.damping.data() : nullptr};
   const std::size_t doubles = step::kScratchColumns * step::scratch_stride(layout_.largest_chunk) +
@@ -137,7 +141,7 @@ CellStiffness::Evaluation CellStiffness::run_kernels(bool energy) {
         if (scratch.size() < doubles) scratch.resize(doubles);
         const StepLayout::Chunk& chunk = layout_.chunks[i];
         step::ChunkView of = {};
-        of.blocks = layout_.blocks.data() + chunk.block_begin;
+        of.blocks = blocks + chunk.block_begin;
         of.corners = layout_.corners.data() + chunk.corner_begin;
         of.block_count = chunk.block_end - chunk.block_begin;
         of.cell_fill = layout_.cell_fill.data() + chunk.fill_begin;
