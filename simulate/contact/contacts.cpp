@@ -116,9 +116,9 @@ double Contacts::begin_implicit_step(const State& before, const State& aimed, do
   return share;
 }
 
-void Contacts::add_normal_stiffness(const State& trial, BlockMatrix& matrix) {
+void Contacts::add_normal_stiffness(const State& trial, ContactTangent kind, BlockMatrix& matrix) {
   update(trial);
-  implicit_.add_normal_stiffness(matrix);
+  add_contact_stiffness(surface_, list_, states_, kind, matrix);
 }
 
 double Contacts::friction_potential(const State& trial) const {

@@ -11,6 +11,7 @@
 #include "simulate/conditions/part_touch.h"
 #include "simulate/contact/contact_friction.h"
 #include "simulate/contact/contact_step_bound.h"
+#include "simulate/contact/contact_stiffness.h"
 #include "simulate/contact/implicit_contact.h"
 
 namespace flexel::simulate {
@@ -48,7 +49,8 @@ class Contacts {
   [[nodiscard]] double begin_implicit_step(const State& before, const State& aimed, double step);
   [[nodiscard]] bool take_recoupled() { return std::exchange(coupled_at_, list_.builds()) != list_.builds(); }
   [[nodiscard]] std::vector<CoupledElements> couples() const { return implicit_.couples(); }
-  void add_normal_stiffness(const State& trial, BlockMatrix& matrix);
+  [[nodiscard]] const std::vector<std::uint32_t>& carrying_elements() const { return list_.elements(); }
+  void add_normal_stiffness(const State& trial, ContactTangent kind, BlockMatrix& matrix);
   [[nodiscard]] double friction_potential(const State& trial) const;
   void add_friction_stiffness(const State& trial, BlockMatrix& matrix) const;
   [[nodiscard]] bool settles(const State& found);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "simulate/contact/contact_stiffness.h"
+
 namespace flexel::simulate {
 namespace {
 
@@ -158,57 +160,43 @@ void ImplicitContact::add_forces(const State& trial, std::vector<Vec3>& forces) 
   }
 }
 
+// Pairs of which one side alone moves freely are summed up by its point first; they follow one another, mostly.
 void ImplicitContact::add_friction_stiffness(const State& trial, BlockMatrix& matrix) const {
   std::vector<std::pair<std::uint32_t, double>> shares;  // of elements that move freely
+  std::array<Mat3, 64> sum;
+  const InterpolationWeights* summed = nullptr;
+  const auto flush = [&] {
+    if (summed) add_blocks(*summed, sum, matrix);
+    summed = nullptr;
+  };
   for (const Rubbing& pair : rubbing_) {
     const Mat3 own = stiffness(pair, moved(pair, trial));
     if (own == Mat3::Zero()) continue;
     shares.clear();
+    const InterpolationWeights* one = nullptr;  // of the last side that moves freely
     for (std::size_t s = 0; s < 2; ++s) {
       const Side& side = pair.sides[s];
       if (!side.moves || !deforms(side.point)) continue;
-      const InterpolationWeights& at = list_.point(side.point).at;
-      for (std::uint32_t a = 0; a < at.count; ++a)
-        shares.emplace_back(at.elements[a], s == 0 ? -side.shares[a] : side.shares[a]);
+      one = &list_.point(side.point).at;
+      for (std::uint32_t a = 0; a < one->count; ++a)
+        shares.emplace_back(one->elements[a], s == 0 ? -side.shares[a] : side.shares[a]);
     }
-    for (const auto& [row, a] : shares)
-      for (const auto& [column, b] : shares) matrix.values[position_of(matrix, row, column)] += a * b * own;
+    if (!one) continue;
+    if (shares.size() > one->count) {  // both sides
+      for (const auto& [row, a] : shares)
+        for (const auto& [column, b] : shares) matrix.values[position_of(matrix, row, column)] += a * b * own;
+      continue;
+    }
+    if (one != summed) {
+      flush();
+      summed = one;
+      sum.fill(Mat3::Zero());
+    }
+    for (std::size_t a = 0; a < shares.size(); ++a)
+      for (std::size_t b = 0; b < shares.size(); ++b)
+        sum[8 * a + b] += (shares[a].second * shares[b].second) * own;
   }
-}
-
-// The derivative of the gap by the elements of a point, as in contact_loads.cpp; `turning`: that by its normal [m].
-void ImplicitContact::add_levers(std::uint32_t number, double sign, const Vec3& normal, const Vec3& turning,
-                                 std::vector<std::pair<std::uint32_t, Vec3>>& levers) const {
-  if (!deforms(number)) return;
-  const ContactPoint& point = list_.point(number);
-  const PointState& now = states_.points()[number];
-  const Vec3& own = now.side.normal;
-  const Vec3 turned = now.inverse * (turning - turning.dot(own) * own);
-  for (std::uint32_t a = 0; a < point.at.count; ++a) {
-    Vec3 lever = sign * point.at.weights[a] * normal;
-    if (point.at.count == 8) lever -= surface_.gradients(point.part)[a].dot(turned) * own;
-    levers.emplace_back(point.at.elements[a], lever);
-  }
-}
-
-void ImplicitContact::add_normal_stiffness(BlockMatrix& matrix) const {
-  std::vector<std::pair<std::uint32_t, Vec3>> levers;
-  for (const std::uint32_t p : states_.active()) {
-    const PairState& now = states_[p];
-    if (!(now.pressure > 0)) continue;
-    const ContactPair& pair = list_.pairs()[p];
-    const double stiffness = now.stiffness - now.weight * (1 - now.share);
-    const Vec3 tilt = now.length > 0 ? Vec3(now.offset / now.length) : Vec3(Vec3::Zero());
-    levers.clear();
-    add_levers(pair.i, -1, now.normal,
-               pair.of_plane() ? Vec3(Vec3::Zero()) : Vec3(states_.points()[pair.i].side.own_plane * tilt),
-               levers);
-    if (!pair.of_plane())
-      add_levers(pair.j, 1, now.normal, -states_.points()[pair.j].side.own_plane * tilt, levers);
-    for (const auto& [row, a] : levers)
-      for (const auto& [column, b] : levers)
-        matrix.values[position_of(matrix, row, column)] += stiffness * a * b.transpose();
-  }
+  flush();
 }
 
 void ImplicitContact::finish(const State& state) {

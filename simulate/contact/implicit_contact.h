@@ -12,9 +12,6 @@
 // pair meets are taken from a solution and held while Newton's method finds the next (lagged: Li et al. 2020,
 // section 5.2), until they do not change any more. k is that of the beginning of the step, as the damping of cells
 // is: a dashpot lets the pair press less, with that it would become softer, and the rounds would not end.
-//
-// The tangent leaves out how weights and normals turn with the motion: it has k b b^T with b the gap's
-// derivative, which is positive.
 #pragma once
 #include "simulate/contact/contact_friction.h"
 #include "simulate/models/stiffness.h"
@@ -37,8 +34,6 @@ class ImplicitContact {
   [[nodiscard]] double potential(const State& trial) const;
   void add_forces(const State& trial, std::vector<Vec3>& forces) const;
   void add_friction_stiffness(const State& trial, BlockMatrix& matrix) const;
-  // Of the pairs as evaluated [N/m].
-  void add_normal_stiffness(BlockMatrix& matrix) const;
 
   [[nodiscard]] const std::vector<Vec3>& before() const { return before_; }  // (elements) m
 
@@ -68,8 +63,6 @@ class ImplicitContact {
   [[nodiscard]] Vec3 force(const Rubbing& pair, const Vec3& moved) const;
   [[nodiscard]] Mat3 stiffness(const Rubbing& pair, const Vec3& moved) const;
   [[nodiscard]] bool deforms(std::uint32_t point) const;
-  void add_levers(std::uint32_t point, double sign, const Vec3& normal, const Vec3& turning,
-                  std::vector<std::pair<std::uint32_t, Vec3>>& levers) const;
 
   double damping_;
   const ContactSurface& surface_;

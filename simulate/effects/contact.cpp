@@ -335,7 +335,15 @@ void ContactLosses::add_stiffness(const State& state, BlockMatrix& matrix) {
 }
 
 void Contact::add_stiffness(const State& state, BlockMatrix& matrix) {
-  contacts_->add_normal_stiffness(state, matrix);
+  contacts_->add_normal_stiffness(state, ContactTangent::whole, matrix);
+}
+
+void Contact::add_positive_stiffness(const State& state, BlockMatrix& matrix) {
+  contacts_->add_normal_stiffness(state, ContactTangent::positive, matrix);
+}
+
+std::vector<std::uint32_t> Contact::may_pull_at() const {
+  return contacts_->carrying_elements();
 }
 
 std::vector<CoupledElements> Contact::couples() const {

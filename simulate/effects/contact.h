@@ -26,6 +26,7 @@ class ContactLosses : public Effect {
   [[nodiscard]] bool acts(const State& state) override;
   void add_forces(const State& state, std::vector<Vec3>& forces) override;
   void add_stiffness(const State& state, BlockMatrix& matrix) override;
+  [[nodiscard]] bool tells_where_it_pulls() const override { return true; }  // nowhere that Contact does not
   void finish_step(State& state, const StepDone& done) override;
 
  private:
@@ -68,6 +69,9 @@ class Contact : public Effect {
   [[nodiscard]] bool acts(const State& state) override;
   void add_forces(const State& state, std::vector<Vec3>& forces) override;
   void add_stiffness(const State& state, BlockMatrix& matrix) override;
+  void add_positive_stiffness(const State& state, BlockMatrix& matrix) override;
+  [[nodiscard]] std::vector<std::uint32_t> may_pull_at() const override;
+  [[nodiscard]] bool tells_where_it_pulls() const override { return true; }
   [[nodiscard]] double added_frequency(const State& state, const std::vector<double>& mass) override;
   [[nodiscard]] bool needs_step_recheck(const State& state) override;
   // Needs no finishes_steps(): what it remembers does not mind that the last velocities are of a whole step.

@@ -104,8 +104,11 @@ class Effect {
   [[nodiscard]] virtual bool acts(const State&) { return true; }
   // N, minus the energy's derivative.
   virtual void add_forces(const State&, std::vector<Vec3>& /*forces*/) {}
-  // N/m, minus the forces' derivative.
+  // N/m, minus the forces' derivative; and as much of it as is positive semi-definite, where it may not be.
   virtual void add_stiffness(const State&, BlockMatrix&) {}
+  virtual void add_positive_stiffness(const State& state, BlockMatrix& matrix) {
+    add_stiffness(state, matrix);
+  }
   // N, how the forces of an effect that follows() change to first order along a change (elements) m; or
   // that with the derivative transposed (true). Added to the last.
   virtual void add_force_change(const State&, const std::vector<Vec3>&, bool, std::vector<Vec3>&) {}
@@ -122,6 +125,8 @@ class Effect {
   // --- equilibrium (simulate/equilibrium/equilibrium.h) ---
   // Elements that add_stiffness() may add to in some state, though add_forces() does not pull at them in most.
   [[nodiscard]] virtual std::vector<std::uint32_t> may_pull_at() const { return {}; }
+  // These are all that it adds to now: its forces are not to be tried to find out.
+  [[nodiscard]] virtual bool tells_where_it_pulls() const { return false; }
   // Share of the load that one load step may have at most.
   [[nodiscard]] virtual double longest_load_step() const { return 1; }
   // Why a load step did not lead from one equilibrium to the other, though forces balance in both; empty: it did.

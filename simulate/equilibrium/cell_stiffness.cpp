@@ -5,6 +5,8 @@
 #include "simulate/equilibrium/cell_stiffness.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "base/instruction_set.h"
 #include "base/parallel.h"
@@ -24,6 +26,14 @@ const step::ProductTable& product_table() {
   return best_table(&step::products_portable, &step::products_avx2, &step::products_avx512);
 #else
   return step::products_portable();
+#endif
+}
+
+const step::KernelTable& evaluation_table() {
+#if defined(__x86_64__)
+  return best_table(&step::kernels_portable, &step::kernels_avx2, &step::kernels_avx512);
+#else
+  return step::kernels_portable();
 #endif
 }
 
@@ -89,6 +99,118 @@ CellStiffness::CellStiffness(const Problem& problem, const StiffnessPattern& pat
   }
 }
 
+void CellStiffness::renew_pattern_of(const std::vector<ActiveEffect>& effects) {
+  added_ = matrix_of_effects(body_, pattern_.matrix, effects);
+  adding_.reset();
+}
+
+void CellStiffness::prepare_kernels() {
+  work_.kernels = &evaluation_table();
+  work_.ones.assign(body_.element_count(), 1);
+  for (step::CellConstants& constants : layout_.constants) {
+    constants.damping = 0;
+    constants.yield = constants.strength = constants.elongation = std::numeric_limits<double>::infinity();
+  }
+}
+
+// One advance of unit masses from rest for a unit of time, in which nothing moves: velocities are the forces.
+CellStiffness::Evaluation CellStiffness::run_kernels(bool energy) {
+  struct Sum {
+    double elastic = 0, smallest = std::numeric_limits<double>::infinity();
+    Sum& operator+=(const Sum& other) {
+      elastic += other.elastic;
+      smallest = other.smallest >= smallest ? smallest : other.smallest;  // one that is not a number wins
+      return *this;
+    }
+  };
+  const step::Composition has{energy ? step::Damping::book : step::Damping::none, false, energy};
+  work_.damping.resize(energy ? 3 * work_.places.size() : 0);
+  work_.shared_damping.resize(energy ? shared_force_.size() : 0);
+  // The kernels that tell the energy break cells that have turned inside out.
+  std::vector<step::CellBlock> breakable;
+  if (energy) breakable = layout_.blocks;
+  step::CellBlock* const blocks = energy ? breakable.data() : layout_.blocks.data();
+  const step::StateView view{work_.places.data()->data(), work_.pulls.data()->data(), nullptr,
+                             work_.ones.data(), energy ? work_.damping.data() : nullptr};
+  const std::size_t doubles = step::kScratchColumns * step::scratch_stride(layout_.largest_chunk) +
+                              step::kScratchAlignment / sizeof(double);
+  const Sum sum = parallel_sum<Sum>(
+      layout_.chunks.size(),
+      [&](std::size_t i) {
+        thread_local std::vector<double> scratch;
+        if (scratch.size() < doubles) scratch.resize(doubles);
+        const StepLayout::Chunk& chunk = layout_.chunks[i];
+        step::ChunkView of = {};
+        of.blocks = blocks + chunk.block_begin;
+        of.corners = layout_.corners.data() + chunk.corner_begin;
+        of.block_count = chunk.block_end - chunk.block_begin;
+        of.cell_fill = layout_.cell_fill.data() + chunk.fill_begin;
+        of.elements = layout_.elements.data() + chunk.element_begin;
+        of.count = chunk.element_end - chunk.element_begin;
+        of.owned = layout_.owned.data() + chunk.owned_begin;
+        of.shared = layout_.shared.data() + chunk.shared_begin;
+        of.owned_count = chunk.owned_end - chunk.owned_begin;
+        of.shared_count = chunk.shared_end - chunk.shared_begin;
+        of.shared_force = shared_force_.data() + 3 * chunk.shared_begin;
+        if (energy) of.shared_damping = work_.shared_damping.data() + 3 * chunk.shared_begin;
+        of.constants = &layout_.constants[chunk.kind];
+        const step::ChunkOutcome outcome = work_.kernels->cells[step::variant_number(has)](
+            of, view, {1, 0, false}, step::first_aligned(scratch));
+        return Sum{outcome.elastic, outcome.smallest_jacobian};
+      },
+      1);
+  return {sum.elastic, sum.smallest};
+}
+
+// What keeps corners from folding, which the kernels do not have.
+void CellStiffness::add_corners(const State& state, Evaluation& made, std::vector<Vec3>* forces) const {
+  constexpr std::size_t kGrain = 512;
+  std::vector<std::vector<std::uint32_t>> near((body_.cell_count() + kGrain - 1) / kGrain);
+  const auto corners = [&](std::size_t c) {
+    CellVectors u;
+    for (std::size_t a = 0; a < 8; ++a) u[a] = state.displacement[body_.cell_elements[c][a]];
+    return u;
+  };
+  parallel_chunks(body_.cell_count(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t c = begin; c < end; ++c)
+      if (active_[c] && !far_from_folding(kinds_[part_[c]].turned, corners(c)))
+        near[begin / kGrain].push_back(static_cast<std::uint32_t>(c));
+  });
+  for (const std::vector<std::uint32_t>& chunk : near)
+    for (const std::uint32_t c : chunk) {
+      const CellKind& kind = kinds_[part_[c]].turned;
+      const CornerThresholds thresholds = fold_thresholds(kind, std::nullopt);
+      const CellVectors u = corners(c);
+      const double energy = share_[c] * fold_energy(kind, thresholds, u);
+      made.energy += energy;
+      if (!std::isfinite(energy)) made.smallest = std::min(made.smallest, 0.0);
+      if (!forces || energy == 0) continue;
+      CellVectors force;
+      force.fill(Vec3::Zero());
+      add_fold_forces(kind, thresholds, u, force);
+      for (std::size_t a = 0; a < 8; ++a) (*forces)[body_.cell_elements[c][a]] += share_[c] * force[a];
+    }
+}
+
+CellStiffness::Evaluation CellStiffness::evaluate(const State& state, bool energy,
+                                                  std::vector<Vec3>* forces) {
+  if (!work_.kernels) prepare_kernels();
+  work_.places = state.displacement;
+  work_.pulls.assign(work_.places.size(), Vec3::Zero());
+  Evaluation made = run_kernels(energy);
+  if (forces) {
+    parallel_for_each(forces->size(), [&](std::size_t e) { (*forces)[e] += work_.pulls[e]; });
+    parallel_for_each(layout_.shared_elements.size(), [&](std::size_t i) {
+      Vec3& sum = (*forces)[layout_.shared_elements[i]];
+      for (std::uint32_t slot = layout_.slot_offsets[i]; slot < layout_.slot_offsets[i + 1]; ++slot)
+        sum += Eigen::Map<const Vec3>(shared_force_.data() + 3 * std::size_t{layout_.slots[slot]});
+    });
+  }
+  add_corners(state, made, forces);
+  if (energy && !(made.smallest > 0)) made.energy = std::numeric_limits<double>::infinity();
+  return made;
+}
+
 // The columns of one lane.
 void CellStiffness::prepare_lane(std::uint32_t cell, const State& state, const TangentOptions& tangent,
                                  double* to) const {
@@ -146,6 +268,7 @@ const FoldTangent* CellStiffness::folding_of(std::uint32_t cell) const {
 void CellStiffness::linearise(const State& state, const TangentOptions& tangent) {
   std::fill(added_.values.begin(), added_.values.end(), Block::Zero());
   adding_.reset();
+  cells_diagonal_.clear();
   folding_.clear();
   mask_.clear();
   held_.clear();
@@ -225,6 +348,8 @@ void CellStiffness::products_of_cells(const double* x, double* y) const {
 
 CellStiffness::Adding CellStiffness::adding() const {
   Adding result;
+  result.columns.reserve(added_.values.size());
+  result.values.reserve(added_.values.size());
   for (std::uint32_t e = 0; e < body_.element_count(); ++e) {
     const std::size_t before = result.columns.size();
     for (std::uint64_t q = added_.row_offsets[e]; q < added_.row_offsets[e + 1]; ++q)
@@ -243,9 +368,10 @@ CellStiffness::Adding CellStiffness::adding() const {
 void CellStiffness::multiply(const double* x, double* y) const {
   const double* from = x;
   if (!held_.empty()) {
-    masked_.resize(3 * body_.element_count());
-    parallel_for_each(masked_.size(),
-                      [&](std::size_t k) { masked_[k] = mask_[k / 3] >> k % 3 & 1 ? 0 : x[k]; });
+    masked_.assign(x, x + 3 * body_.element_count());
+    for (const std::uint32_t e : held_)
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        if (mask_[e] >> axis & 1) masked_[3 * std::size_t{e} + axis] = 0;
     from = masked_.data();
   }
   products_of_cells(from, y);
@@ -255,12 +381,20 @@ void CellStiffness::multiply(const double* x, double* y) const {
       Eigen::Map<Vec3>(y + 3 * std::size_t{elements[ab / 8]}) +=
           each.blocks[ab] * Eigen::Map<const Vec3>(from + 3 * std::size_t{elements[ab % 8]});
   }
+  if (!inertia_.empty())
+    parallel_for_each(inertia_.size(), [&](std::size_t e) {
+      Eigen::Map<Vec3>(y + 3 * e) += inertia_[e] * Eigen::Map<const Vec3>(from + 3 * e);
+    });
   if (!adding_) adding_ = adding();
   parallel_for_each(adding_->rows.size(), [&](std::size_t r) {
-    Vec3 sum = Vec3::Zero();
-    for (std::uint64_t q = adding_->offsets[r]; q < adding_->offsets[r + 1]; ++q)
-      sum += adding_->values[q] * Eigen::Map<const Vec3>(from + 3 * std::size_t{adding_->columns[q]});
-    Eigen::Map<Vec3>(y + 3 * std::size_t{adding_->rows[r]}) += sum;
+    double sum[3] = {};
+    for (std::uint64_t q = adding_->offsets[r]; q < adding_->offsets[r + 1]; ++q) {
+      const double* block = adding_->values[q].data();
+      const double* at = from + 3 * std::size_t{adding_->columns[q]};
+      for (int i = 0; i < 3; ++i)
+        sum[i] += block[3 * i] * at[0] + block[3 * i + 1] * at[1] + block[3 * i + 2] * at[2];
+    }
+    for (std::size_t i = 0; i < 3; ++i) y[3 * std::size_t{adding_->rows[r]} + i] += sum[i];
   });
   for (std::size_t h = 0; h < held_.size(); ++h)
     for (std::size_t axis = 0; axis < 3; ++axis)
@@ -370,13 +504,15 @@ const Block* CellStiffness::blocks(std::size_t begin, std::size_t end, std::vect
         if (const FoldTangent* blocks = folding_of(at.cell))
           for (std::size_t b = 0; b < 8; ++b)
             row[pattern_.stencil.slot[at.cell][8 * at.corner + b]] += (*blocks)[8 * at.corner + b];
+    if (!inertia_.empty())
+      row[diagonal_position(pattern_.matrix, e) - row_offsets()[e]].diagonal().array() += inertia_[e];
     add_effects(e, row);
     if (!mask_.empty()) eliminate_row(e, row);
   }
   return room.data();
 }
 
-std::vector<Block> CellStiffness::diagonal() const {
+std::vector<Block> CellStiffness::diagonal_of_cells() const {
   std::vector<Block> diagonal(rows());  // touched first by several threads
   parallel_for_each(rows(), [&](std::size_t e) {
     std::array<Block, 8> own;
@@ -389,6 +525,15 @@ std::vector<Block> CellStiffness::diagonal() const {
     if (!folding_.empty())
       for (const Incidence& at : pattern_.stencil.of(static_cast<std::uint32_t>(e)))
         if (const FoldTangent* blocks = folding_of(at.cell)) diagonal[e] += (*blocks)[9 * at.corner];
+  });
+  return diagonal;
+}
+
+std::vector<Block> CellStiffness::diagonal() const {
+  if (keeps_diagonal_ && cells_diagonal_.empty()) cells_diagonal_ = diagonal_of_cells();
+  std::vector<Block> diagonal = keeps_diagonal_ ? cells_diagonal_ : diagonal_of_cells();
+  parallel_for_each(rows(), [&](std::size_t e) {
+    if (!inertia_.empty()) diagonal[e].diagonal().array() += inertia_[e];
     if (added_.row_offsets[e + 1] > added_.row_offsets[e])
       diagonal[e] += added_.values[diagonal_position(added_, e)];
     if (!mask_.empty() && mask_[e])

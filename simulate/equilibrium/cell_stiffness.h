@@ -24,8 +24,23 @@ class CellStiffness final : public LinearOperator {
   CellStiffness(const Problem& problem, const StiffnessPattern& pattern,
                 const std::vector<ActiveEffect>& effects);
 
+  // What the cells make of a state, by the kernels of timed runs: J, only where it is asked for; the smallest J of a
+  // cell, not above 0 where a corner is folded too. Forces [N] are added to `forces`, unless that is null.
+  struct Evaluation {
+    double energy = 0, smallest = 1;
+  };
+  [[nodiscard]] Evaluation evaluate(const State& state, bool energy, std::vector<Vec3>* forces);
+
   // Takes up the cells' tangents at `state`, nothing added and nothing eliminated.
   void linearise(const State& state, const TangentOptions& tangent);
+  // kg/s^2 (elements), that resist every motion of the elements; empty: none. Stays until it is given again.
+  // From then on the diagonal of the cells is kept from one stiffness of effects to the next.
+  void set_inertia(std::vector<double> inertia) {
+    inertia_ = std::move(inertia);
+    keeps_diagonal_ = true;
+  }
+  // What effects add to has changed.
+  void renew_pattern_of(const std::vector<ActiveEffect>& effects);
   // What effects add: rows and columns of the elements that they pull at, and of their neighbours. Zero after
   // linearise().
   [[nodiscard]] BlockMatrix& added() {
@@ -70,6 +85,9 @@ class CellStiffness final : public LinearOperator {
     std::vector<Block> values;
   };
 
+  void prepare_kernels();
+  void add_corners(const State& state, Evaluation& made, std::vector<Vec3>* forces) const;
+  [[nodiscard]] Evaluation run_kernels(bool energy);
   void products_of_cells(const double* x, double* y) const;
   [[nodiscard]] Adding adding() const;
   // Blocks (a, b) of a cell for b in [begin, end), a its corner at the element, into out[b]; deformed ones in
@@ -77,6 +95,7 @@ class CellStiffness final : public LinearOperator {
   void cell_blocks(const Incidence& at, std::size_t begin, std::size_t end, Block* out) const;
   void deformed_blocks(const PartKind& part, const double* from, double share, std::size_t a,
                        std::size_t begin, std::size_t end, Block* out) const;
+  [[nodiscard]] std::vector<Block> diagonal_of_cells() const;
   void turn(std::size_t element, Block* block, std::size_t count) const;
   void add_effects(std::size_t element, Block* row) const;
   void eliminate_row(std::size_t element, Block* row) const;
@@ -94,6 +113,15 @@ class CellStiffness final : public LinearOperator {
   step::TangentForm form_ = step::TangentForm::at_rest;
   std::vector<double> tangents_;  // by block: columns of kLanes
   std::vector<Folding> folding_;  // ascending
+  bool keeps_diagonal_ = false;
+  mutable std::vector<Block> cells_diagonal_;  // (elements) of the cells alone; empty: to be made
+  struct Work {
+    const step::KernelTable* kernels = nullptr;
+    std::vector<double> ones;                     // (elements)
+    std::vector<Vec3> places, pulls;              // (elements) m, N
+    std::vector<double> damping, shared_damping;  // N, of the books, which come with the energy
+  } work_;                                        // of evaluate()
+  std::vector<double> inertia_;                   // (elements) or empty
   BlockMatrix added_;
   mutable std::optional<Adding> adding_;               // made by the first product
   std::vector<std::uint8_t> mask_;                     // (elements) prescribed components; empty: none

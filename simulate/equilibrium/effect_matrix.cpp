@@ -19,7 +19,7 @@ std::vector<std::uint8_t> pulled_elements(const Body& body, const std::vector<Ac
       state.displacement[e][static_cast<Eigen::Index>(axis)] = scattered(3 * e + axis);
   std::vector<Vec3> forces(n, Vec3::Zero());
   for (const ActiveEffect& effect : effects)
-    if (effect->adds_stiffness()) effect->add_forces(state, forces);
+    if (effect->adds_stiffness() && !effect->tells_where_it_pulls()) effect->add_forces(state, forces);
   std::vector<std::uint8_t> pulled(n);
   for (std::size_t e = 0; e < n; ++e) pulled[e] = forces[e] != Vec3::Zero();
   return pulled;

@@ -56,7 +56,8 @@ Mechanics::Lattice::Lattice(const Problem& problem, const PaperModel& paper,
   made.emplace(problem, pattern, effects);
   const State rest{std::vector<Vec3>(problem.body.element_count(), Vec3::Zero()), 1};
   try {
-    for (const ActiveEffect& effect : effects) effect->add_stiffness(rest, made->added());
+    for (const ActiveEffect& effect : effects)
+      if (!effect->tells_where_it_pulls()) effect->add_stiffness(rest, made->added());
   } catch (const MissingBlock&) {
     made.reset();
     pattern.matrix.values.assign(pattern.matrix.columns.size(), Block::Zero());
@@ -106,7 +107,7 @@ double Mechanics::energy(const State& state) {
   double energy = 0;
   {
     const ScopeTimer timer(cell_seconds_);
-    energy = cells().energy(state);
+    energy = energy_of_cells(state);
   }
   {
     const ScopeTimer timer(paper_seconds_);
@@ -117,7 +118,18 @@ double Mechanics::energy(const State& state) {
 }
 
 double Mechanics::elastic_energy(const State& state) {
-  return (elsewhere_ ? elsewhere_->figures(state).energy : cells().energy(state)) + paper_.energy(state);
+  return (elsewhere_ ? elsewhere_->figures(state).energy : energy_of_cells(state)) + paper_.energy(state);
+}
+
+double Mechanics::energy_of_cells(const State& state) {
+  return by_kernels_ ? lattice().made->evaluate(state, true, nullptr).energy : cells().energy(state);
+}
+
+bool Mechanics::is_sound(const State& state, const Forces& forces) {
+  if (!by_kernels_) return std::isfinite(energy(state));
+  return forces.smallest > 0 &&
+         std::all_of(effects_.begin(), effects_.end(),
+                     [&](const ActiveEffect& effect) { return std::isfinite(effect->energy(state)); });
 }
 
 SmallestJacobian Mechanics::smallest_corner_jacobian(const State& state) const {
@@ -125,15 +137,24 @@ SmallestJacobian Mechanics::smallest_corner_jacobian(const State& state) const {
 }
 
 void Mechanics::add_elastic_forces(const State& state, std::vector<Vec3>& forces) {
+  (void)add_forces_of_models(state, forces);
+}
+
+// The smallest J of a cell, where the kernels tell it.
+double Mechanics::add_forces_of_models(const State& state, std::vector<Vec3>& forces) {
+  double smallest = 1;
   {
     const ScopeTimer timer(cell_seconds_);
     if (elsewhere_)
       elsewhere_->add_forces(state, forces);
+    else if (by_kernels_)
+      smallest = lattice().made->evaluate(state, false, &forces).smallest;
     else
       lattice().cells.add_forces(state, forces);
   }
   const ScopeTimer timer(paper_seconds_);
   paper_.add_forces(state, forces);
+  return smallest;
 }
 
 Forces Mechanics::forces(const State& state) {
@@ -142,7 +163,7 @@ Forces Mechanics::forces(const State& state) {
   result.total.assign(body_.element_count(), Vec3::Zero());
   for (const ActiveEffect& effect : effects_)
     effect->add_forces(state, effect.couples.empty() ? result.total : inner);
-  add_elastic_forces(state, inner);
+  result.smallest = add_forces_of_models(state, inner);
   const double outer = squared_norm(result.total);
   const double held = parallel_sum<double>(inner.size(), [&](std::size_t e) {
     double sum = 0;
@@ -182,7 +203,23 @@ void Mechanics::assemble(const State& state, const TangentOptions& tangent) {
     const ScopeTimer timer(paper_seconds_);
     paper_.add_stiffness(state, tangent.project, lattice().pattern.matrix);
   }
-  for (const ActiveEffect& effect : effects_) effect->add_stiffness(state, lattice().added());
+  for (std::size_t e = 0; e < inertia_.size(); ++e)
+    lattice().added().values[diagonal_position(lattice().added(), e)].diagonal().array() += inertia_[e];
+  for (const ActiveEffect& effect : effects_)
+    tangent.project ? effect->add_positive_stiffness(state, lattice().added())
+                    : effect->add_stiffness(state, lattice().added());
+}
+
+void Mechanics::set_inertia(std::vector<double> inertia) {
+  by_kernels_ = lattice().made.has_value();
+  if (by_kernels_)
+    lattice().made->set_inertia(std::move(inertia));
+  else
+    inertia_ = std::move(inertia);
+}
+
+void Mechanics::renew_effects_pattern() {
+  if (lattice().made) lattice().made->renew_pattern_of(effects_);
 }
 
 void Mechanics::eliminate_prescribed() {

@@ -14,7 +14,8 @@ namespace flexel::simulate {
 // Forces on the elements [N].
 struct Forces {
   std::vector<Vec3> total;  // (elements) of the models and of every effect
-  double scale = 0;  // 2-norm of what acts from outside: loads, ties, and matter on prescribed components
+  double scale = 0;     // 2-norm of what acts from outside: loads, ties, and matter on prescribed components
+  double smallest = 1;  // J of a cell, where the kernels of timed runs tell it (Mechanics::set_inertia())
 };
 
 // Where matter is compressed most.
@@ -95,6 +96,13 @@ class Mechanics {
   // Tangent stiffness into tangent(), prescribed components not yet eliminated.
   void assemble(const State& state, const TangentOptions& tangent = {});
   void eliminate_prescribed();
+  // Whether the energy is finite; `forces`: those of the state.
+  [[nodiscard]] bool is_sound(const State& state, const Forces& forces);
+  // kg/s^2 (elements): from here on tangents hold what inertia resists in an implicit step, and cells whose
+  // stiffness is made are evaluated by the kernels of timed runs.
+  void set_inertia(std::vector<double> inertia);
+  // Effects add to other elements than they did, of the same cells or couples.
+  void renew_effects_pattern();
   // Of the tangent only what effects add is made anew, at `state`; what was eliminated stays so. False, and nothing has
   // changed, where that is stored together with the rest, or a load follows the shape.
   [[nodiscard]] bool renew_effects(const State& state);
@@ -139,6 +147,8 @@ class Mechanics {
   };
   static std::vector<CoupledElements> coupled(const std::vector<ActiveEffect>& effects);
   void follow_loads();
+  double add_forces_of_models(const State& state, std::vector<Vec3>& forces);
+  [[nodiscard]] double energy_of_cells(const State& state);
   [[nodiscard]] Lattice& lattice() const {
     if (!lattice_) lattice_ = std::make_unique<Lattice>(problem_, paper_, effects_, stored_);
     return *lattice_;
@@ -147,14 +157,15 @@ class Mechanics {
   Problem problem_;
   const Body& body_;
   PaperModel paper_;
-  bool stored_;
+  bool stored_, by_kernels_ = false;
   std::vector<ActiveEffect> effects_;
   mutable std::unique_ptr<Lattice> lattice_;   // null until it is asked for
   std::shared_ptr<CellsElsewhere> elsewhere_;  // null: all is done here
   Constraints constraints_;
   std::optional<FollowedTangent> followed_;
-  State linearised_;       // of the last assemble(), where loads follow
-  double free_scale_ = 0;  // N, the norm of the forces that free strain makes at rest
+  std::vector<double> inertia_;  // of set_inertia(), where the tangent is stored
+  State linearised_;             // of the last assemble(), where loads follow
+  double free_scale_ = 0;        // N, the norm of the forces that free strain makes at rest
   double cell_seconds_ = 0, paper_seconds_ = 0;
 };
 

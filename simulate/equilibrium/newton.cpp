@@ -94,6 +94,7 @@ class Solver {
   [[nodiscard]] bool full() const { return options_.steps == NewtonSteps::full; }
   void begin();
   [[nodiscard]] bool arrived();
+  bool keeps_cells();
   bool advance();
   void prepare_tangent(bool project);
   void factor();
@@ -120,6 +121,7 @@ class Solver {
   std::vector<Vec3> residual_;  // forces on free components
   std::vector<Vec3> direction_;
   double residual_norm_ = 0, scale_ = 0;
+  bool sound_ = true;  // the state after a full step
   bool tangent_kept_ = false;
   bool indefinite_ = false;  // conjugate gradients met negative curvature in the last solve
   double longest_step_ = 0;
@@ -130,6 +132,7 @@ class Solver {
 
 void Solver::update_residual() {
   Forces forces = mechanics_.forces(state_);
+  sound_ = !full() || mechanics_.is_sound(state_, forces);
   residual_ = std::move(forces.total);
   clear_prescribed(mechanics_.constraints(), residual_);
   residual_norm_ = norm(residual_);
@@ -324,9 +327,7 @@ bool Solver::full_step() {
   longest_step_ = std::max(longest_step_, length);
   const bool shrinks = outcome_.iterations < kStepsToShrink || length < kShrunk * longest_step_;
   if (indefinite_ || !shrinks) return false;
-  State trial = moved(1);
-  if (!std::isfinite(mechanics_.energy(trial))) return false;
-  before_ = std::exchange(state_, std::move(trial));
+  before_ = std::exchange(state_, moved(1));
   if (!gap_.empty()) {
     apply(mechanics_.constraints(), mechanics_.body(), state_, state_.displacement);
     gap_.clear();
@@ -363,11 +364,20 @@ bool Solver::arrived() {
   if (led && (residual_norm_ <= options_.tolerance * scale_ || residual_norm_ == 0)) return true;
   const double keep_below = std::clamp(last_forcing(), kKeepTangentBelow, kKeepLastTangentBelow);
   tangent_kept_ = kept_.factored && led && kept_.model_error <= keep_below;
-  if (tangent_kept_)
+  if (tangent_kept_ || keeps_cells())
     before_.reset();
   else
     prepare_tangent(false);
   return led && residual_norm_ <= rounding_floor(mechanics_.tangent(), state_.displacement);
+}
+
+// Whether the cells' share of the tangent is kept; then that of effects has been made anew.
+bool Solver::keeps_cells() {
+  if (!kept_.factored || kept_.projected || !gap_.empty() ||
+      !(kept_.model_error <= options_.keep_cells_below) || !mechanics_.renew_effects(state_))
+    return false;
+  kept_.factored = false;
+  return true;
 }
 
 // One iteration. False when there is no step to take.
@@ -388,6 +398,7 @@ bool Solver::advance() {
   const double before = led ? residual_norm_ : norm(rhs);
   if (!(full() ? full_step() : led ? line_search(residual_) : lead_prescribed())) return false;
   update_residual();
+  if (!sound_) return false;
   if (before > 0) {
     parallel_for_each(rhs.size(), [&](std::size_t e) { predicted[e] -= residual_[e]; });
     kept_.model_error = norm(predicted) / before;

@@ -24,6 +24,8 @@ struct NewtonOptions {
   DirectLimit direct;      // of aggregation_multigrid()
   bool unstressed =
       false;  // the first tangent has no geometric stiffness: the linear answer of unstressed matter
+  // Of the last step: below it the cells' share of the tangent is kept, and that of effects alone made anew.
+  double keep_cells_below = 0;
   // m: a first linear answer that reaches further ends the attempt
   double farthest_reach = std::numeric_limits<double>::infinity();
 };

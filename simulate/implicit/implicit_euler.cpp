@@ -18,6 +18,9 @@ constexpr double kShortest = 1.0 / 1024;  // of a step
 constexpr int kFullIterations = 12;
 // Elements: contact changes the tangent in every iteration, and a factorisation is dearer than a hierarchy.
 constexpr std::size_t kDirectRowsTouching = 100;
+// Of a step of Newton's method, relative, under which the cells' tangent serves
+// for the next one: what contact does changes more.
+constexpr double kKeepCellsBelow = 0.1;
 constexpr int kPasses = 12;            // of Newton's method, until what is held fixed in it suits
 constexpr int kLooks = 40;             // at a step, each at a shorter one, until effects bear it
 constexpr double kBorneWhole = 0.999;  // share that needs no other look
@@ -45,10 +48,26 @@ void ImplicitEuler::make_mechanics() {
   forget();
   if (mechanics_)
     for (std::size_t p = 0; p < effects_.size(); ++p) seconds_[p] += mechanics_->effects()[p].seconds;
-  mechanics_.emplace(problem_, all_effects(), StiffnessStorage::stored);
+  mechanics_.emplace(problem_, all_effects(), storage());
+  inertia_of_ = 0;
   coupled_ = mechanics_->coupled_elements();
   std::sort(coupled_.begin(), coupled_.end());
   if (damped_) damping_matrix_ = mechanics_->stiffness();
+}
+
+// The damping matrix, and what resists velocity, have places only beside stored cells.
+StiffnessStorage ImplicitEuler::storage() const {
+  const bool resists = std::any_of(effects_.begin(), effects_.end(),
+                                   [](const ActiveEffect& effect) { return effect->resists(); });
+  return damped_ || resists || !CellStiffness::fits(problem_, PaperModel(problem_)) ? StiffnessStorage::stored
+                                                                                    : StiffnessStorage::made;
+}
+
+void ImplicitEuler::set_inertia() {
+  inertia_of_ = step_;
+  std::vector<double> inertia(mass_.size());
+  for (std::size_t e = 0; e < inertia.size(); ++e) inertia[e] = mass_[e] / (step_ * step_);
+  mechanics_->set_inertia(std::move(inertia));
 }
 
 // An effect of the run as the mechanics of a step sees it: one that resists velocity has that of the step.
@@ -62,6 +81,8 @@ class ImplicitEuler::EffectOfStep : public Effect {
   }
   [[nodiscard]] bool follows() const override { return effect_->follows(); }
   [[nodiscard]] std::vector<CoupledElements> couples() const override { return effect_->couples(); }
+  [[nodiscard]] std::vector<std::uint32_t> may_pull_at() const override { return effect_->may_pull_at(); }
+  [[nodiscard]] bool tells_where_it_pulls() const override { return effect_->tells_where_it_pulls(); }
   void constrain(Constraints& constraints) override {
     effect_->constrain(constraints);
     effect_->constrain_implicit_steps(constraints);
@@ -78,6 +99,9 @@ class ImplicitEuler::EffectOfStep : public Effect {
     effect_->resists() ? effect_->add_resistance(euler_->along_the_way(state), 1 / euler_->step_, matrix)
                        : effect_->add_stiffness(state, matrix);
   }
+  void add_positive_stiffness(const State& state, BlockMatrix& matrix) override {
+    effect_->resists() ? add_stiffness(state, matrix) : effect_->add_positive_stiffness(state, matrix);
+  }
   void add_force_change(const State& state, const std::vector<Vec3>& change, bool transposed,
                         std::vector<Vec3>& forces) override {
     effect_->add_force_change(state, change, transposed, forces);
@@ -93,7 +117,6 @@ class ImplicitEuler::Inertia : public Effect {
   static constexpr const char* name = "inertia";
   explicit Inertia(const ImplicitEuler& euler) : euler_(&euler) {}
   [[nodiscard]] std::string why() const override { return "implicit steps"; }
-  [[nodiscard]] bool adds_stiffness() const override { return true; }
   [[nodiscard]] double energy(const State& state) override {
     const double step = euler_->step_;
     return 0.5 / (step * step) * parallel_sum<double>(euler_->mass_.size(), [&](std::size_t e) {
@@ -104,12 +127,6 @@ class ImplicitEuler::Inertia : public Effect {
     const double step = euler_->step_;
     parallel_for_each(euler_->mass_.size(), [&](std::size_t e) {
       forces[e] -= euler_->mass_[e] / (step * step) * (state.displacement[e] - euler_->target_[e]);
-    });
-  }
-  void add_stiffness(const State&, BlockMatrix& matrix) override {
-    const double step = euler_->step_;
-    parallel_for_each(euler_->mass_.size(), [&](std::size_t e) {
-      matrix.values[diagonal_position(matrix, e)].diagonal().array() += euler_->mass_[e] / (step * step);
     });
   }
 
@@ -192,6 +209,7 @@ bool ImplicitEuler::solve(State& trial, NewtonSteps steps,
   if (steps == NewtonSteps::full) options.max_iterations = kFullIterations;
   options.least_scale = force_scale();
   if (touches_) options.direct.rows = kDirectRowsTouching;
+  options.keep_cells_below = kKeepCellsBelow;
   for (int pass = 0; pass < kPasses; ++pass) {
     const NewtonOutcome outcome = newton(
         *mechanics_, trial, options, [&](double, const std::string& note) { progress(note); }, &memory_);
@@ -200,7 +218,11 @@ bool ImplicitEuler::solve(State& trial, NewtonSteps steps,
     told.trouble = outcome.trouble;
     if (!outcome.converged) return false;
     if (!settles(trial)) continue;
-    if (std::isfinite(mechanics_->energy(trial))) return true;
+    Forces found = mechanics_->forces(trial);
+    if (mechanics_->is_sound(trial, found)) {
+      supports_ = std::move(found.total);
+      return true;
+    }
     told.trouble = "surfaces pass through one another within the step";
     return false;
   }
@@ -246,8 +268,13 @@ std::optional<double> ImplicitEuler::begin(const State& state, double end, doubl
     if (share * step_ < shortest || look == kLooks) return std::nullopt;
     end = *state.time + share * step_;
   }
-  if (recouples && !covers_couples()) make_mechanics();
+  if (recouples && !covers_couples())
+    make_mechanics();
+  else if (recouples)
+    mechanics_->renew_effects_pattern();
   if (std::abs(step_ - previous) > kSameStep * previous) forget();
+  // Steps differ by rounding: what begins anew must not know of the earlier ones.
+  if (!memory_.preconditioner || std::abs(step_ - inertia_of_) > kSameStep * inertia_of_) set_inertia();
   return end;
 }
 
@@ -283,7 +310,6 @@ bool ImplicitEuler::attempt(State& state, const std::function<void(const std::st
     moved_[e] = trial.displacement[e] - before_.displacement[e];
     trial.velocity[e] = moved_[e] / step;
   });
-  supports_ = mechanics_->forces(trial).total;
   parallel_for_each(mass_.size(), [&](std::size_t e) {
     for (int axis = 0; axis < 3; ++axis)
       supports_[e][axis] = mechanics_->constraints().mask[e] >> axis & 1 ? -supports_[e][axis] : 0;

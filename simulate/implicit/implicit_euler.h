@@ -70,6 +70,8 @@ class ImplicitEuler {
   class StepDamping;
   [[nodiscard]] std::vector<ActiveEffect> all_effects();
   void make_mechanics();
+  [[nodiscard]] StiffnessStorage storage() const;
+  void set_inertia();
   [[nodiscard]] bool covers_couples() const;
   std::optional<double> begin(const State& state, double end, double shortest);
   void aim(const State& state, double end);
@@ -87,6 +89,7 @@ class ImplicitEuler {
   double tolerance_;
   bool damped_ = false, touches_ = false;  // by damping and contact
   double step_ = 0, reach_;                // s
+  double inertia_of_ = 0;                  // s, the step that the tangent's inertia is of
   State before_;                           // at the start of the step
   std::vector<Vec3> target_;               // x~, displacements without forces [m]
   State aimed_;                            // those, with what is led where it will be

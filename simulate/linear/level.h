@@ -30,9 +30,10 @@ template <int R>
 struct Level {
   using Inverse = Eigen::Matrix<float, R, R>;
   using Vector = Eigen::Matrix<double, R, 1>;
-  std::vector<Inverse> inverse_diagonal;  // (rows)
-  double largest_eigenvalue = 0;          // of D^-1 A, estimated from below
-  std::vector<float> eigenvector;         // (rows x R) that the estimate is from; of elements only
+  std::vector<Inverse> inverse_diagonal;              // (rows)
+  std::vector<Eigen::Matrix<double, R, R>> inverted;  // (rows) the blocks that these are of; empty: not kept
+  double largest_eigenvalue = 0;                      // of D^-1 A, estimated from below
+  std::vector<float> eigenvector;  // (rows x R) that the estimate is from; of elements only
   Chebyshev smoother;
   Transfer<R> transfer;
   mutable std::vector<double> rhs, x, next;  // (rows x R) work of one cycle
@@ -65,6 +66,7 @@ struct Level {
 }
 
 constexpr std::size_t kRowGrain = 256;
+constexpr std::size_t kKeptBlocks = 65'536;  // rows, up to which a level keeps what it has inverted
 
 // body(i, (A x)_i) for every row; `image` (rows x R) may be overwritten.
 template <int R, class Body>
@@ -134,11 +136,15 @@ void prepare_smoother(const std::vector<BlockType>& diagonal, const Multiply& mu
   double largest = 0;
   for (const BlockType& block : diagonal) largest = std::max(largest, block.diagonal().cwiseAbs().maxCoeff());
   level.inverse_diagonal.resize(n);
-  parallel_for_each(n, [&](std::size_t i) {
-    const Eigen::Matrix<double, R, R>& block = diagonal[i];
-    level.inverse_diagonal[i] = guarded_inverse<R>(block, 1e-14 * largest).template cast<float>();
-  });
   const bool onwards = estimate == Estimate::onwards && level.eigenvector.size() == n * R;
+  const bool keeps = onwards && n <= kKeptBlocks, kept = keeps && level.inverted.size() == n;
+  level.inverted.resize(keeps ? n : 0);
+  parallel_for_each(n, [&](std::size_t i) {
+    const Eigen::Matrix<double, R, R> block = diagonal[i];
+    if (kept && block == level.inverted[i]) return;
+    level.inverse_diagonal[i] = guarded_inverse<R>(block, 1e-14 * largest).template cast<float>();
+    if (keeps) level.inverted[i] = block;
+  });
   const int steps = onwards ? 4 : 12;
   double* v = level.next.data();
   double* w = (R == 3 ? level.image : level.x).data();

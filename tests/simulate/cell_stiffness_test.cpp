@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <limits>
 #include <ostream>
 #include <random>
 
@@ -109,6 +110,7 @@ class CellStiffnessOf : public ::testing::TestWithParam<TangentCase> {
     State state{random_vectors(body_.element_count(), GetParam().size), 1};
     for (std::size_t e = 0; e < body_.element_count(); ++e)
       state.displacement[e] -= GetParam().squeeze * body_.rest[e];
+    state_ = state;
     corner_ = stored_.cells().smallest_corner_jacobian(state).value;
     const std::vector<Vec3> step = random_vectors(body_.element_count(), 0.01);
     stress_ = stored_.cells().predicted_stress(state, step);
@@ -154,6 +156,7 @@ class CellStiffnessOf : public ::testing::TestWithParam<TangentCase> {
   Scene scene_;
   Problem problem_;
   Mechanics stored_, made_;
+  State state_;
   std::vector<Mat3> stress_;
   double corner_ = 1;  // smallest J of one
 };
@@ -185,6 +188,32 @@ TEST_P(CellStiffnessOf, IsTheStoredOneForAnyNumberOfThreads) {
   expect_same_bits();
   for (Mechanics* each : {&stored_, &made_}) each->eliminate_prescribed();
   expect_same();
+}
+
+// Of an implicit step: forces, energy and the diagonal that is kept.
+TEST_P(CellStiffnessOf, EvaluatesStatesAsTheCellsDo) {
+  made_.assemble(state_, {});
+  const std::vector<Block> before = made_.tangent().diagonal();
+  made_.set_inertia(std::vector<double>(body_.element_count(), 100));
+  stored_.set_inertia(std::vector<double>(body_.element_count(), 100));
+  State inside_out = state_;
+  for (std::size_t e = 0; e < body_.element_count(); ++e)
+    inside_out.displacement[e] = Vec3(-2 * body_.rest[e].x(), 0, 0);
+  EXPECT_EQ(made_.elastic_energy(inside_out), std::numeric_limits<double>::infinity());
+  Forces found = made_.forces(inside_out);
+  EXPECT_FALSE(made_.is_sound(inside_out, found));
+  found = made_.forces(state_);
+  const Forces expected = stored_.forces(state_);
+  EXPECT_EQ(made_.is_sound(state_, found), stored_.is_sound(state_, expected));
+  double largest = 0;
+  for (const Vec3& force : expected.total) largest = std::max(largest, force.norm());
+  for (std::size_t e = 0; e < body_.element_count(); ++e)
+    ASSERT_LE((found.total[e] - expected.total[e]).norm(), 1e-11 * largest) << e;
+  const double energy = stored_.elastic_energy(state_);
+  EXPECT_NEAR(made_.elastic_energy(state_), energy, 1e-11 * energy);
+  const std::vector<Block> after = made_.tangent().diagonal();
+  for (std::size_t e = 0; e < body_.element_count(); ++e)
+    ASSERT_LT((after[e] - before[e] - 100 * Block::Identity()).norm(), 1e-12 * after[e].norm()) << e;
 }
 
 TEST(CellStiffness, CellsBesideGapsAreNoRun) {

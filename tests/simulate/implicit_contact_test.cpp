@@ -43,7 +43,9 @@ struct Pressed {
   std::optional<Contacts> contacts;
   State before, trial;
 
-  Pressed(double friction, double damping) : body(stacked()), problem(testing::problem_of(body)) {
+  // `shaken` [m]: how far its elements are moved in the step, at most, each its own way.
+  Pressed(double friction, double damping, double shaken = 1e-4)
+      : body(stacked()), problem(testing::problem_of(body)) {
     ContactSettings settings = all_parts(body);
     settings.friction = friction;
     settings.damping = damping;
@@ -53,7 +55,7 @@ struct Pressed {
     before = starting_at_rest(body);
     EXPECT_EQ(contacts->begin_implicit_step(before, before, 1e-3), 1);
     trial = before;
-    const std::vector<Vec3> more = random_displacements(body, 1e-4, 3);
+    const std::vector<Vec3> more = random_displacements(body, shaken, 3);
     for (std::size_t e = 0; e < more.size(); ++e) trial.displacement[e] += more[e];
     (void)contacts->energy(trial);
     (void)contacts->settles(trial);  // friction of the pressure there
@@ -119,25 +121,44 @@ TEST(ImplicitContact, FrictionsTangentIsTheDerivativeOfItsForces) {
     EXPECT_LT((expected[e] + (ahead[e] - behind[e]) / (2 * kWay)).norm(), 1e-4 * largest) << e;
 }
 
-// The tangent leaves out how weights and normals turn.
-TEST(ImplicitContact, TheNormalTangentIsNearTheDerivativeAndPositive) {
-  Pressed made(0, 0);
+// Of the tangent of the normal forces along `direction`: N/m; how far it is from their derivative, relative.
+struct Tangent {
+  std::vector<Vec3> image;
+  double error = 0;
+};
+
+Tangent tangent_along(Pressed& made, const std::vector<Vec3>& direction, ContactTangent kind) {
   BlockMatrix matrix = made.matrix();
-  made.contacts->add_normal_stiffness(made.trial, matrix);
-  for (const unsigned seed : {4u, 5u, 6u}) {
-    const std::vector<Vec3> direction = random_displacements(made.body, 1, seed);
-    std::vector<Vec3> image(direction.size());
-    multiply(matrix, direction, image);
-    EXPECT_GE(product(direction, image), 0);
-    constexpr double kWay = 1e-9;
-    const std::vector<Vec3> ahead = made.forces(made.along(direction, kWay), true),
-                            behind = made.forces(made.along(direction, -kWay), true);
-    double norm = 0, error = 0;
-    for (std::size_t e = 0; e < image.size(); ++e) {
-      norm += image[e].squaredNorm();
-      error += (image[e] + (ahead[e] - behind[e]) / (2 * kWay)).squaredNorm();
+  made.contacts->add_normal_stiffness(made.trial, kind, matrix);
+  Tangent tangent{std::vector<Vec3>(direction.size()), 0};
+  multiply(matrix, direction, tangent.image);
+  constexpr double kWay = 1e-9;
+  const std::vector<Vec3> ahead = made.forces(made.along(direction, kWay), true),
+                          behind = made.forces(made.along(direction, -kWay), true);
+  double norm = 0, error = 0;
+  for (std::size_t e = 0; e < direction.size(); ++e) {
+    norm += tangent.image[e].squaredNorm();
+    error += (tangent.image[e] + (ahead[e] - behind[e]) / (2 * kWay)).squaredNorm();
+  }
+  tangent.error = std::sqrt(error / norm);
+  return tangent;
+}
+
+// What is left out goes with the energy: it is of second order in the depth.
+TEST(ImplicitContact, TheNormalTangentIsTheDerivativeOfTheForces) {
+  for (const auto& [deeper, share] : {std::pair{1e-4, 1e-4}, std::pair{8e-4, 3e-3}}) {
+    Pressed made(0, 0, deeper);
+    for (const unsigned seed : {4u, 5u, 6u}) {
+      const std::vector<Vec3> direction = random_displacements(made.body, 1, seed),
+                              other = random_displacements(made.body, 1, seed + 10);
+      const Tangent whole = tangent_along(made, direction, ContactTangent::whole),
+                    positive = tangent_along(made, direction, ContactTangent::positive);
+      EXPECT_LT(whole.error, share) << deeper;
+      EXPECT_GT(positive.error, 10 * whole.error);
+      EXPECT_GE(product(direction, positive.image), 0);
+      const double back = product(direction, tangent_along(made, other, ContactTangent::whole).image);
+      EXPECT_NEAR(back, product(other, whole.image), 1e-10 * std::abs(back));
     }
-    EXPECT_LT(std::sqrt(error), 0.1 * std::sqrt(norm));
   }
 }
 
