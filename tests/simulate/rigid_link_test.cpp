@@ -236,7 +236,7 @@ TEST(RigidLink, WhatATorqueWithoutEnergyDoesIsNotClaimed) {
 // The end of a wire a thousand times as long as thick goes as far through its rigid link as without one (F L^3 / 3 E I); free,
 // it is told from that.
 TEST(RigidLink, AWireResistsAndAFreeOneDoesNot) {
-  const testing::BoxOptions options{.cells = {100, 2, 2}, .spacing = Vec3(0.01, 0.0005, 0.0005)};
+  const testing::BoxOptions options{.cells = {400, 2, 2}, .spacing = Vec3(0.0025, 0.0005, 0.0005)};
   const std::string force = "force = [0, 0, \"1e-5 N\"]";
   Body linked = testing::box_body(options), averaged = testing::box_body(options),
        free = testing::box_body(options);
