@@ -254,10 +254,21 @@ class Run {
     }
     if (!arguments_.points.empty()) {
       table_ = read_points(arguments_.points, unit_);
-      map_points(body, table_->points);
+      anchors_ = map_points(body, table_->points);
     }
   }
 
+  // Of a table's points, which the body's surface told; nothing: those that the mapping finds.
+  [[nodiscard]] const std::optional<VertexAnchors>& anchors() const { return anchors_; }
+  // Cells have other numbers now, and what lies under the surface is not known any more.
+  void forget_anchors() {
+    if (!anchors_) return;
+    anchors_.reset();
+    progress_.warn(
+        "the lattice changes in this series: from here on a point goes with its nearest element, which "
+        "beside another "
+        "part or wall nearer than a cell may be that one's");
+  }
   [[nodiscard]] const Surface* written() const { return foreign_ ? &*foreign_ : nullptr; }
   [[nodiscard]] std::vector<SurfaceFormat> formats() const {
     std::vector<SurfaceFormat> formats;
@@ -358,6 +369,7 @@ class Run {
   Progress& progress_;
   std::optional<Surface> foreign_;
   std::optional<PointTable> table_;
+  std::optional<VertexAnchors> anchors_;   // of its points
   std::optional<std::size_t> split_from_;  // triangles
   std::optional<LatticeVolume> whole_;
   SplitAdvice advice_ = SplitAdvice::length;
@@ -366,8 +378,10 @@ class Run {
 };
 
 // The binding that the arguments name: read, with its method, or made and saved. Nothing where they name
-// none.
-std::optional<Binding> own_binding(const Arguments& arguments, const Body& body, MapOptions& options) {
+// none and the anchors are not known either.
+std::optional<Binding> own_binding(const Arguments& arguments, const Body& body,
+                                   const std::optional<VertexAnchors>& anchors, std::size_t states,
+                                   MapOptions& options) {
   std::optional<Binding> binding;
   if (!arguments.binding.empty()) {
     binding = read_binding(arguments.binding, body);
@@ -376,8 +390,10 @@ std::optional<Binding> own_binding(const Arguments& arguments, const Body& body,
                                                       name_of(binding->method), name_of(options.method)));
     options.method = binding->method;
   } else if (!arguments.save_binding.empty()) {
-    binding = bind(body, options.method);
+    binding = anchors ? bind(body, options.method, *anchors) : bind(body, options.method);
     write_binding(*binding, body, arguments.save_binding);
+  } else if (anchors) {
+    binding = bind(body, options.method, *anchors, states);
   }
   return binding;
 }
@@ -399,7 +415,7 @@ void map_one(const Arguments& arguments, Plan& plan, Progress& progress) {
   progress.stage("map");
   if (plan.refine.mode == RefineOptions::Mode::to_edge)
     run.split(body, refine_to_edge(body.surface, plan.refine.edge));
-  const std::optional<Binding> known = own_binding(arguments, body, plan.options);
+  const std::optional<Binding> known = own_binding(arguments, body, run.anchors(), 1, plan.options);
   if (plan.refine.mode == RefineOptions::Mode::automatic) {
     MappedPart mapped =
         map_refined(body, plan.options, plan.crack, plan.refine, run.written(), run.formats(), progress);
@@ -445,9 +461,10 @@ void map_series(const Arguments& arguments, Plan& plan, Progress& progress) {
       run.take_surface(next);
       use_field(next, arguments.map, plan.options);
       split_for_series(files, next, plan, run, progress);
-      binding = own_binding(arguments, next, plan.options);
+      binding = own_binding(arguments, next, run.anchors(), files.size(), plan.options);
     } else {
       take_surface(next, body, files[f]);
+      if (next.cell_elements != body.cell_elements) run.forget_anchors();
       if (!same_lattice(next, body)) binding.reset();
     }
     body = std::move(next);
@@ -456,7 +473,9 @@ void map_series(const Arguments& arguments, Plan& plan, Progress& progress) {
       run.finish(mapped.surface(body), body, mapped.result, mapped.report, frame_name(arguments.output, f));
       continue;
     }
-    if (!binding) binding = bind(body, plan.options.method, files.size() - f);
+    if (!binding)
+      binding = run.anchors() ? bind(body, plan.options.method, *run.anchors(), files.size() - f)
+                              : bind(body, plan.options.method, files.size() - f);
     MapResult result = map_state(*binding, body);
     complete(body, plan.options, result);
     run.finish(body.surface, body, result, report(body, result), frame_name(arguments.output, f));

@@ -162,14 +162,15 @@ void refuse_shared_streams(const Arguments& arguments, const Scene& scene) {
 // A run that is resumed goes on with its checkpoint.
 void check_files(const Arguments& arguments) {
   const SimulateOptions& options = arguments.options;
-  const std::vector<OutputName> results = {{arguments.output, true},
-                                           {arguments.summary},
-                                           {options.history},
-                                           {options.live == "-" ? "-" : ""},
-                                           {arguments.json ? "-" : ""}};
+  std::vector<OutputName> results = {{arguments.output, true},
+                                     {arguments.summary},
+                                     {options.history},
+                                     {options.live == "-" ? "-" : ""},
+                                     {arguments.json ? "-" : ""}};
+  for (OutputName& each : results) each.literal = true;
   std::vector<OutputName> all = results;
-  all.push_back({options.checkpoint});
-  all.push_back({options.failed_output});
+  all.push_back({options.checkpoint, false, true});
+  all.push_back({options.failed_output, false, true});
   std::vector<std::string> inputs = arguments.bodies;
   inputs.push_back(arguments.scene);
   check_outputs(all, inputs, arguments.force);

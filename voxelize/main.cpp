@@ -159,6 +159,7 @@ std::vector<std::string> body_files(const Arguments& arguments) {
 void check_files(const Arguments& arguments) {
   std::vector<OutputName> outputs = {{arguments.vdb, true}, {arguments.summary}, {arguments.json ? "-" : ""}};
   for (const std::string& file : body_files(arguments)) outputs.push_back({file, true});
+  for (OutputName& each : outputs) each.literal = true;
   check_outputs(outputs, arguments.parts, arguments.force);
 }
 

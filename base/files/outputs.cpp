@@ -22,8 +22,8 @@ bool is_pattern(const std::string& path) {
   return path.find("{part}") != std::string::npos || path.find("{frame}") != std::string::npos;
 }
 
-bool is_series(const std::string& path) {
-  return extension(path) == "pvd" && !is_pattern(path);
+bool stands_for_many(const OutputName& output) {
+  return !output.literal && is_pattern(output.path);
 }
 
 // What glob() takes for itself alone.
@@ -62,8 +62,8 @@ bool same_file(const std::string& a, const std::string& b) {
 
 }  // namespace
 
-std::vector<std::string> files_replaced(const std::string& path) {
-  if (is_pattern(path)) {
+std::vector<std::string> files_replaced(const std::string& path, bool literal_braces) {
+  if (!literal_braces && is_pattern(path)) {
     std::string pattern = literal(path);
     for (const std::string place : {"{part}", "{frame}"})
       for (std::size_t at = pattern.find(place); at != std::string::npos; at = pattern.find(place))
@@ -72,7 +72,7 @@ std::vector<std::string> files_replaced(const std::string& path) {
   }
   std::vector<std::string> files;
   if (std::error_code none; fs::exists(path, none)) files.push_back(path);
-  if (!is_series(path)) return files;
+  if (extension(path) != "pvd" || (!literal_braces && is_pattern(path))) return files;
   const std::string before = path.substr(0, path.size() - 4) + "_", after = ".vtu";
   for (const std::string& frame : files_like(literal(before) + "*" + after)) {
     const std::string number = frame.substr(before.size(), frame.size() - before.size() - after.size());
@@ -85,7 +85,8 @@ std::vector<std::string> files_replaced(const std::string& path) {
 namespace {
 
 // Throws InputError where `path` would or may replace one of `inputs`.
-void keep_inputs(const std::string& path, const std::vector<std::string>& inputs) {
+void keep_inputs(const OutputName& output, const std::vector<std::string>& inputs) {
+  const std::string& path = output.path;
   const auto is_input = [&](const std::string& file) {
     return std::any_of(inputs.begin(), inputs.end(), [&](const std::string& input) {
       return !input.empty() && input != "-" && same_file(file, input);
@@ -94,10 +95,11 @@ void keep_inputs(const std::string& path, const std::vector<std::string>& inputs
   const std::string what = "is an input of this command",
                     advice = "name another output, or add --force to replace it";
   if (is_input(path)) throw InputError(path, fmt::format("{}: {}", what, advice));
-  for (const std::string& file : files_replaced(path))
+  const bool series = extension(path) == "pvd" && !stands_for_many(output);
+  for (const std::string& file : files_replaced(path, output.literal))
     if (is_input(file))
       throw InputError(file, fmt::format("{} and fits the name of a result, {}: {}", what,
-                                         is_series(path) ? "a frame of " + path : path, advice));
+                                         series ? "a frame of " + path : path, advice));
 }
 
 }  // namespace
@@ -107,18 +109,18 @@ void check_outputs(const std::vector<OutputName>& outputs, const std::vector<std
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     const std::string& path = outputs[i].path;
     if (path.empty()) continue;
-    for (std::size_t j = 0; j < i && !is_pattern(path); ++j) {
+    for (std::size_t j = 0; j < i && !stands_for_many(outputs[i]); ++j) {
       const std::string& other = outputs[j].path;
-      if (other.empty() || is_pattern(other)) continue;
+      if (other.empty() || stands_for_many(outputs[j])) continue;
       if (means_stdout(path) && means_stdout(other))
         throw InputError("two results would go to stdout: give one of them a file");
       if (!means_stdout(path) && !means_stdout(other) && !can_be_shared(path) && same_file(path, other))
         throw InputError(fmt::format("two results would go to \"{}\": give each a name of its own", path));
     }
-    if (!means_stdout(path) && !can_be_shared(path) && !force) keep_inputs(path, inputs);
+    if (!means_stdout(path) && !can_be_shared(path) && !force) keep_inputs(outputs[i], inputs);
   }
   for (const OutputName& output : outputs)
-    if (!is_pattern(output.path)) refuse_unwritable(output.path, output.binary);
+    if (!stands_for_many(output)) refuse_unwritable(output.path, output.binary);
 }
 
 }  // namespace flexel

@@ -106,8 +106,9 @@ struct CommandLine::Limits {
   void declare(CLI::App& app) {
     app.add_option("--timeout", timeout, "Stop after this time (\"90 s\", \"5 min\"): exit 5")
         ->type_name("TIME");
-    app.add_option("--max-memory", memory,
-                   "Take no more than this (\"4GB\"); refuse at once what is sure to need more")
+    app.add_option(
+           "--max-memory", memory,
+           "Take no more than this (\"4GB\"); where a need is known beforehand, more is refused at once")
         ->type_name("BYTES");
     app.add_option("--max-elements", elements, "Refuse bodies of more elements")->type_name("COUNT");
   }

@@ -6,9 +6,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <span>
 #include <tuple>
+#include <utility>
 
 namespace flexel {
 namespace {
@@ -135,6 +137,200 @@ std::optional<CellPoint> SurfaceLocator::operator()(const Vec3& point) {
 
 std::optional<CellPoint> locate_on_surface(const Body& body, std::size_t polygon, const Vec3& point) {
   return SurfaceLocator(body, polygon)(point);
+}
+
+namespace {
+
+constexpr double kSameDistance = 1e-6;  // spacings: distances that differ by rounding
+
+bool is_left_out(std::span<const std::uint8_t> left_out, std::uint32_t owner) {
+  return owner < left_out.size() && left_out[owner] != 0;
+}
+
+std::pair<std::uint32_t, std::uint32_t> owners_of(const Part& part) {
+  return part.placement == Placement::corner ? std::pair(part.cell_begin, part.cell_end)
+                                             : std::pair(part.element_begin, part.element_end);
+}
+
+std::tuple<std::int64_t, std::int64_t, std::int64_t> order_of(const Index3& index) {
+  return {index[2], index[1], index[0]};
+}
+
+double same_in(const Part& part) {
+  return kSameDistance * part.lattice.spacing.maxCoeff();
+}
+
+}  // namespace
+
+PointHomes::PointHomes(const Body& body, std::span<const std::uint8_t> left_out_cells,
+                       std::span<const std::uint8_t> left_out_elements)
+    : body_(body),
+      left_out_cells_(left_out_cells),
+      left_out_elements_(left_out_elements),
+      polygons_(body.surface) {
+  for (const Part& part : body.parts) {
+    const auto [begin, end] = owners_of(part);
+    bool ascend = true;
+    for (std::uint32_t i = begin + 1; i < end && ascend; ++i)
+      ascend = order_of(voxel(part, i - 1)) <= order_of(voxel(part, i));
+    sorted_.push_back(ascend);
+  }
+}
+
+const Index3& PointHomes::voxel(const Part& part, std::uint32_t owner) const {
+  return part.placement == Placement::corner ? lowest_corner(body_, owner) : body_.lattice_index[owner];
+}
+
+// Owners within rounding of the nearest are kept.
+void PointHomes::consider(const Part& part, std::uint32_t owner, const Vec3& point, Nearest& nearest) const {
+  const bool cell = part.placement == Placement::corner;
+  if (is_left_out(cell ? left_out_cells_ : left_out_elements_, owner)) return;
+  const double distance = std::sqrt(
+      squared_distance(part.lattice.to_lattice(point), voxel_of(voxel(part, owner)), part.lattice.spacing));
+  if (distance > nearest.distance + same_in(part)) return;
+  if (distance < nearest.distance - same_in(part)) nearest.owners.clear();
+  nearest.distance = std::min(nearest.distance, distance);
+  nearest.owners.push_back(owner);
+}
+
+PointHomes::Nearest PointHomes::all_voxels(const Part& part, const Vec3& point) const {
+  Nearest nearest{std::numeric_limits<double>::infinity(), {}};
+  const auto [begin, end] = owners_of(part);
+  for (std::uint32_t i = begin; i < end; ++i) consider(part, i, point, nearest);
+  return nearest;
+}
+
+// Those of the 27 about the point; a voxel beyond them is further than a spacing away.
+PointHomes::Nearest PointHomes::near_voxels(const Part& part, const Vec3& point) const {
+  const Nearest none{std::numeric_limits<double>::infinity(), {}};
+  if (sorted_[static_cast<std::size_t>(&part - body_.parts.data())] == 0) {
+    Nearest nearest = all_voxels(part, point);
+    return nearest.distance <= part.lattice.spacing.minCoeff() ? nearest : none;
+  }
+  Nearest nearest{part.lattice.spacing.minCoeff(), {}};
+  const auto [begin, end] = owners_of(part);
+  const Vec3 at = part.lattice.to_lattice(point).array().floor();
+  if (!(at.cwiseAbs().maxCoeff() < 1e9)) return none;
+  for (int n = 0; n < 27; ++n) {
+    const Index3 wanted = {static_cast<std::int32_t>(at[0]) + n % 3 - 1,
+                           static_cast<std::int32_t>(at[1]) + n / 3 % 3 - 1,
+                           static_cast<std::int32_t>(at[2]) + n / 9 - 1};
+    std::uint32_t low = begin, high = end;  // the first at that voxel
+    while (low < high) {
+      const std::uint32_t middle = low + (high - low) / 2;
+      if (order_of(voxel(part, middle)) < order_of(wanted))
+        low = middle + 1;
+      else
+        high = middle;
+    }
+    for (; low < end && voxel(part, low) == wanted; ++low) consider(part, low, point, nearest);
+  }
+  if (nearest.owners.empty()) return none;
+  std::sort(nearest.owners.begin(), nearest.owners.end());
+  return nearest;
+}
+
+bool PointHomes::has_matter(std::uint32_t polygon) const {
+  const std::uint32_t part = body_.surface.polygon_part(polygon);
+  if (body_.parts[part].placement == Placement::centre || body_.surface_cell_offsets.empty()) return true;
+  return body_.surface_cell_offsets[polygon] < body_.surface_cell_offsets[polygon + 1];
+}
+
+// The part whose voxels are nearest; of several the one whose surface is. A part of which too little is here for a voxel
+// has the point where its surface is nearer than theirs, and the point on its inner side and on their outer side.
+std::uint32_t PointHomes::part_of(const std::vector<Nearest>& nearest, const Vec3& point) const {
+  const auto least = std::min_element(nearest.begin(), nearest.end(), [](const Nearest& a, const Nearest& b) {
+    return a.distance < b.distance;
+  });
+  const auto first = static_cast<std::uint32_t>(least - nearest.begin());
+  if (body_.parts.size() == 1) return first;
+  const double same = same_in(body_.parts[first]);
+  const auto as_near = [&](std::uint32_t part) { return nearest[part].distance <= least->distance + same; };
+  const auto polygon = polygons_.find(point, same, [&](std::uint32_t each) {
+    return as_near(body_.surface.polygon_part(each)) && has_matter(each);
+  });
+  if (!polygon) return first;
+  const std::uint32_t found = body_.surface.polygon_part(polygon->polygon);
+  if (!polygon->outside) return found;
+  const auto other = polygons_.find(point, same, [&](std::uint32_t each) { return has_matter(each); });
+  const std::uint32_t sliver = body_.surface.polygon_part(other->polygon);
+  const bool near = nearest[sliver].distance <= body_.parts[sliver].lattice.spacing.maxCoeff();
+  return near && !other->outside && other->distance < polygon->distance - same ? sliver : found;
+}
+
+// Of these cells (ascending), those that the polygon bounds.
+std::vector<std::uint32_t> PointHomes::bounded(std::uint32_t polygon,
+                                               const std::vector<std::uint32_t>& cells) const {
+  std::vector<std::uint32_t> both;
+  if (body_.surface_cell_offsets.empty()) return both;
+  const auto begin = body_.surface_cells.begin();
+  std::set_intersection(cells.begin(), cells.end(), begin + body_.surface_cell_offsets[polygon],
+                        begin + body_.surface_cell_offsets[polygon + 1], std::back_inserter(both));
+  return both;
+}
+
+// The cell of a polygon that stands in where the point's voxels have none for the matter under it: within two voxels.
+std::optional<std::uint32_t> PointHomes::stand_in(const Part& part, const Nearest& nearest,
+                                                  const NearPolygon& under) const {
+  constexpr int kReach = 2;
+  if (under.outside || !bounded(under.polygon, nearest.owners).empty()) return std::nullopt;
+  const Voxel home = voxel_of(voxel(part, nearest.owners.front()));
+  const double beyond = squared_distance(part.lattice.to_lattice(under.at), home, part.lattice.spacing);
+  if (!(beyond <= same_in(part) * same_in(part))) return std::nullopt;
+  const auto cell = locate_on_surface(body_, under.polygon, under.at);
+  if (!cell || is_left_out(left_out_cells_, cell->cell)) return std::nullopt;
+  const Voxel apart = voxel_of(lowest_corner(body_, cell->cell)) - home;
+  return apart.cwiseAbs().maxCoeff() <= kReach ? std::optional(cell->cell) : std::nullopt;
+}
+
+std::uint32_t PointHomes::cell_of(const Part& part, const Nearest& nearest, const Vec3& point) const {
+  const std::vector<std::uint32_t>& cells = nearest.owners;
+  const auto part_number = static_cast<std::uint32_t>(&part - body_.parts.data());
+  const auto under = polygons_.find(point, same_in(part), [&](std::uint32_t each) {
+    return body_.surface.polygon_part(each) == part_number && has_matter(each);
+  });
+  if (under)
+    if (const auto cell = stand_in(part, nearest, *under)) return *cell;
+  if (cells.size() == 1) return cells.front();
+  // Two pieces of one voxel that a polygon bounds are not told apart by it.
+  const auto distinct = [&](std::uint32_t polygon) -> std::optional<std::uint32_t> {
+    std::optional<std::uint32_t> last;
+    for (const std::uint32_t cell : bounded(polygon, cells)) {
+      if (last && voxel(part, *last) == voxel(part, cell)) return std::nullopt;
+      last = cell;
+    }
+    return last;
+  };
+  const auto bounding =
+      polygons_.find(point, same_in(part), [&](std::uint32_t each) { return distinct(each).has_value(); });
+  return bounding ? *distinct(bounding->polygon) : cells.front();
+}
+
+PointHome PointHomes::choose(const std::vector<Nearest>& nearest, const Vec3& point) const {
+  PointHome home;
+  home.part = part_of(nearest, point);
+  const Part& part = body_.parts[home.part];
+  home.distance = nearest[home.part].distance;
+  if (part.placement == Placement::corner && !nearest[home.part].owners.empty())
+    home.cell = cell_of(part, nearest[home.part], point);
+  return home;
+}
+
+PointHome PointHomes::find(const Vec3& point) const {
+  if (const auto home = find_near(point)) return *home;
+  std::vector<Nearest> nearest;
+  for (const Part& part : body_.parts) nearest.push_back(all_voxels(part, point));
+  return choose(nearest, point);
+}
+
+std::optional<PointHome> PointHomes::find_near(const Vec3& point) const {
+  std::vector<Nearest> nearest;
+  bool any = false;
+  for (const Part& part : body_.parts) {
+    nearest.push_back(near_voxels(part, point));
+    any = any || !nearest.back().owners.empty();
+  }
+  return any ? std::optional(choose(nearest, point)) : std::nullopt;
 }
 
 Vec3 interpolate(const CellPoint& at, const Body& body, const std::vector<Vec3>& element_values) {

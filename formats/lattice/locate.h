@@ -1,4 +1,4 @@
-// From a point on the part's surface to the cell under it.
+// From a point on the part's surface to the cell under it, and from one in its matter to the cell that carries it.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -6,6 +6,7 @@
 #include <span>
 
 #include "formats/lattice/body.h"
+#include "formats/part/nearest_polygon.h"
 
 namespace flexel {
 
@@ -43,6 +44,53 @@ class SurfaceLocator {
   std::optional<std::uint32_t> last_;
   Eigen::Matrix<std::int64_t, 3, 1> last_home_;
   std::array<int, 3> last_first_{};
+};
+
+// The part, and the cell, whose matter a point at rest is of.
+struct PointHome {
+  std::uint32_t part = 0;
+  std::optional<std::uint32_t> cell;  // none at centre placement
+  double distance = 0;                // m, of the point from the nearest voxel
+};
+
+// Finds them: of the voxels nearest to the point, and where voxels of several parts or pieces of matter hold it, as of two
+// walls nearer to each other than a cell, by the surface nearest to it: the way to any other's crosses its own. Matter too
+// little for a cell of its own goes with the cell that stands in under its polygons, as vertices on it do. Keeps
+// references to all that it is given.
+class PointHomes {
+ public:
+  // `left_out`, of cells and of elements: 1: as if it were not there; may be shorter.
+  explicit PointHomes(const Body& body, std::span<const std::uint8_t> left_out_cells = {},
+                      std::span<const std::uint8_t> left_out_elements = {});
+
+  // `point`: m, world frame.
+  [[nodiscard]] PointHome find(const Vec3& point) const;
+  // Likewise, but nothing where no voxel lies within a spacing of its part: looks at few voxels only.
+  [[nodiscard]] std::optional<PointHome> find_near(const Vec3& point) const;
+
+ private:
+  // The voxels of a part that are nearest to the point: its cells, at centre placement its elements.
+  struct Nearest {
+    double distance = 0;  // m; infinite: none
+    std::vector<std::uint32_t> owners;
+  };
+  [[nodiscard]] const Index3& voxel(const Part& part, std::uint32_t owner) const;
+  void consider(const Part& part, std::uint32_t owner, const Vec3& point, Nearest& nearest) const;
+  [[nodiscard]] Nearest near_voxels(const Part& part, const Vec3& point) const;
+  [[nodiscard]] Nearest all_voxels(const Part& part, const Vec3& point) const;
+  [[nodiscard]] PointHome choose(const std::vector<Nearest>& nearest, const Vec3& point) const;
+  [[nodiscard]] std::uint32_t part_of(const std::vector<Nearest>& nearest, const Vec3& point) const;
+  [[nodiscard]] std::uint32_t cell_of(const Part& part, const Nearest& nearest, const Vec3& point) const;
+  [[nodiscard]] std::optional<std::uint32_t> stand_in(const Part& part, const Nearest& nearest,
+                                                      const NearPolygon& under) const;
+  [[nodiscard]] std::vector<std::uint32_t> bounded(std::uint32_t polygon,
+                                                   const std::vector<std::uint32_t>& cells) const;
+  [[nodiscard]] bool has_matter(std::uint32_t polygon) const;
+
+  const Body& body_;
+  std::span<const std::uint8_t> left_out_cells_, left_out_elements_;
+  NearestPolygon polygons_;
+  std::vector<std::uint8_t> sorted_;  // (parts) 1: owners ascend by voxel, k first
 };
 
 // Where the material point is now / was at rest.

@@ -1,5 +1,5 @@
 // The polygons of another surface name no cells, so its vertices are anchored at their nearest elements
-// (mapping/anchors/vertex_anchor.h).
+// (mapping/anchors/vertex_anchor.h). Points of a table ask the body's own surface which matter they are of.
 #include "mapping/anchors/other_surfaces.h"
 
 #include <fmt/format.h>
@@ -12,6 +12,8 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/parallel.h"
+#include "formats/lattice/locate.h"
 #include "mapping/anchors/nearest.h"
 
 namespace flexel::mapping {
@@ -169,7 +171,13 @@ std::string moved_points(const PointTable& table, const std::vector<Vec3>& displ
   return text;
 }
 
-void map_points(Body& body, const std::vector<Vec3>& points) {
+VertexAnchors map_points(Body& body, const std::vector<Vec3>& points) {
+  std::vector<std::optional<PointHome>> homes(points.size());
+  {
+    const PointHomes find(body);
+    parallel_for_each(
+        points.size(), [&](std::size_t i) { homes[i] = find.find_near(points[i]); }, 64);
+  }
   Surface surface;
   surface.vertices = points;
   surface.polygon_offsets = {0};
@@ -177,6 +185,7 @@ void map_points(Body& body, const std::vector<Vec3>& points) {
   surface.parts.resize(body.parts.size());
   body.surface = std::move(surface);
   drop_cells_under_surface(body);
+  return locate_vertices(body, homes);
 }
 
 }  // namespace flexel::mapping

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "formats/lattice/body.h"
+#include "mapping/anchors/vertex_anchor.h"
 
 namespace flexel::mapping {
 
@@ -26,8 +27,9 @@ struct PointTable {
 // text.
 [[nodiscard]] std::string moved_points(const PointTable& table, const std::vector<Vec3>& displacement,
                                        double unit);
-// Puts the points in the place of the body's surface, as vertices that no polygon uses: each goes with the
-// part in whose cells it is, or nearest to; of several the one with the nearest element.
-void map_points(Body& body, const std::vector<Vec3>& points);
+// Puts the points in the place of the body's surface, as vertices that no polygon uses, and finds their anchors: each
+// goes with the part and the wall whose matter it is of, as probes do (formats/lattice/locate.h); further than a spacing
+// from all voxels with the part whose cells are nearest. Throws InputError: a part without elements.
+[[nodiscard]] VertexAnchors map_points(Body& body, const std::vector<Vec3>& points);
 
 }  // namespace flexel::mapping

@@ -162,7 +162,8 @@ Home home_near_element(const Body& body, const Buckets<std::uint32_t>& cells_of,
 
 class AnchorFinder {
  public:
-  explicit AnchorFinder(const Body& body) : body_(body), middle_(middles(body)), grids_(body.parts.size()) {
+  AnchorFinder(const Body& body, const std::vector<std::optional<PointHome>>& homes)
+      : body_(body), homes_(homes), middle_(middles(body)), grids_(body.parts.size()) {
     const std::size_t n = body.surface.vertices.size();
     resize_touched(anchors_.anchor, n);
     resize_touched(anchors_.referenced, n);
@@ -329,6 +330,7 @@ class AnchorFinder {
       return home_near_element(body_, cells_of_, part, grids_[part]->nearest(point), point, middle_[part])
           .anchor;
     }
+    if (v < homes_.size() && homes_[v]) return anchor_at_home(*homes_[v], point);
     // of the part in whose cells it is, or whose cells are nearest; of several the one with the nearest element
     Home best;
     double beside = kUnreached;  // m^2, of the best from its element
@@ -343,7 +345,18 @@ class AnchorFinder {
     return best.anchor;
   }
 
+  [[nodiscard]] VertexAnchor anchor_at_home(const PointHome& known, const Vec3& point) const {
+    const Vec3& middle = middle_[known.part];
+    if (!known.cell)
+      return anchor_at_element(body_, known.part, grids_[known.part]->nearest(point), point, middle);
+    const Lattice& lattice = body_.parts[known.part].lattice;
+    Home home;
+    consider(body_, *known.cell, lattice.to_lattice(point), lattice.spacing, middle, home);
+    return home.anchor;
+  }
+
   const Body& body_;
+  const std::vector<std::optional<PointHome>>& homes_;
   std::vector<std::uint32_t> first_polygon_;         // (vertices) kNone: unused
   std::vector<std::uint32_t> representative_;        // (vertices) whose anchor each shares; empty: its own
   std::vector<Vec3> middle_;                         // (parts x 3) lattice coordinates
@@ -366,7 +379,7 @@ VertexAnchor anchor_at_element(const Body& body, std::uint32_t part, std::uint32
   return {element, false, static_cast<std::uint8_t>(octant)};
 }
 
-VertexAnchors locate_vertices(const Body& body) {
+VertexAnchors locate_vertices(const Body& body, const std::vector<std::optional<PointHome>>& homes) {
   if (body.surface.vertices.empty())
     throw InputError(
         "the body carries no surface to map onto: take the body that "
@@ -374,7 +387,7 @@ VertexAnchors locate_vertices(const Body& body) {
   for (const Part& part : body.parts)
     if (part.element_begin == part.element_end)
       throw InputError("part \"" + part.name + "\" has no elements: voxelize it with a smaller --size");
-  return AnchorFinder(body).take();
+  return AnchorFinder(body, homes).take();
 }
 
 }  // namespace flexel::mapping

@@ -1,5 +1,8 @@
 // Anchors of vertices: where each vertex lies in the lattice.
 #pragma once
+#include <optional>
+
+#include "formats/lattice/locate.h"
 #include "mapping/anchors/nearest.h"
 
 namespace flexel::mapping {
@@ -25,7 +28,9 @@ struct VertexAnchors {
 [[nodiscard]] VertexAnchor anchor_at_element(const Body& body, std::uint32_t part, std::uint32_t element,
                                              const Vec3& point, const Vec3& middle = Vec3::Constant(kHigher));
 
+// `homes` (vertices, or empty): the part and the cell whose matter a vertex that no polygon uses is of, where known.
 // Throws InputError: no surface, a part without elements.
-[[nodiscard]] VertexAnchors locate_vertices(const Body& body);
+[[nodiscard]] VertexAnchors locate_vertices(const Body& body,
+                                            const std::vector<std::optional<PointHome>>& homes = {});
 
 }  // namespace flexel::mapping

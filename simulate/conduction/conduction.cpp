@@ -13,6 +13,7 @@
 
 #include "base/error.h"
 #include "base/human.h"
+#include "base/math/area_vector.h"
 #include "base/stop.h"
 #include "formats/lattice/cell_moments.h"
 #include "formats/lattice/fused_points.h"
@@ -171,8 +172,7 @@ class Conduction {
     return {low, high};
   }
 
-  // "": none.
-  [[nodiscard]] const std::string& warning() const { return warning_; }
+  [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
   [[nodiscard]] const std::string& face_name(std::size_t face) const { return faces_[face].face->name; }
 
  private:
@@ -247,32 +247,32 @@ class Conduction {
                          names +
                              " are bonded, and conduction passes no heat from part to part: make them "
                              "one part, or take temperatures from [thermal] column = \"NAME\"");
-      if (warning_.empty()) warning_ = names + " touch, and parts pass no heat to each other";
+      if (warnings_.empty()) warnings_.push_back(names + " touch, and parts pass no heat to each other");
     });
   }
 
   // A place has one temperature, and heat that comes in there goes straight out.
-  void refuse_at_odds() const {
-    std::vector<const HeatFace*> held(body_.surface.polygon_count(), nullptr);
+  void refuse_at_odds() {
+    held_.assign(body_.surface.polygon_count(), nullptr);
     for (const HeatFace& face : settings_.faces) {
       if (face.kind != HeatFace::Kind::temperature) continue;
       for (const std::uint32_t p : resolve(face.where, body_).polygons) {
-        if (held[p] != nullptr && held[p]->value != face.value)
+        if (held_[p] != nullptr && held_[p]->value != face.value)
           throw InputError(face.origin,
                            fmt::format("\"{}\" and \"{}\" ({}) give the same place two temperatures",
-                                       face.name, held[p]->name, held[p]->origin));
-        held[p] = &face;
+                                       face.name, held_[p]->name, held_[p]->origin));
+        held_[p] = &face;
       }
     }
     for (const HeatFace& face : settings_.faces) {
       if (face.kind == HeatFace::Kind::temperature) continue;
       const std::vector<std::uint32_t> polygons = resolve(face.where, body_).polygons;
       if (!polygons.empty() &&
-          std::all_of(polygons.begin(), polygons.end(), [&](std::uint32_t p) { return held[p] != nullptr; }))
+          std::all_of(polygons.begin(), polygons.end(), [&](std::uint32_t p) { return held_[p] != nullptr; }))
         throw InputError(face.origin,
                          fmt::format("\"{}\" does nothing: [[temperature]] \"{}\" ({}) holds the place where "
                                      "heat comes in; select another face",
-                                     face.name, held[polygons[0]]->name, held[polygons[0]]->origin));
+                                     face.name, held_[polygons[0]]->name, held_[polygons[0]]->origin));
     }
   }
 
@@ -327,8 +327,9 @@ class Conduction {
       throw InputError(face.origin,
                        fmt::format("\"{}\": heat goes through faces, groups and sides; {} selects none",
                                    face.name, describe(face.where)));
-    FaceOfCells made{&face, in_firm_cells(body_, nodes_, face_points(problem_, nodes_, selected.polygons)),
-                     0};
+    FaceOfCells made{
+        &face, in_firm_cells(body_, nodes_, face_points(problem_, nodes_, left_to(face, selected.polygons))),
+        0};
     double area = 0;
     for (const FacePoint& point : made.points) area += point.area_vector.norm();
     if (!(area > 0))
@@ -342,6 +343,33 @@ class Conduction {
                                                            : face.value;
     for (const FacePoint& point : made.points) add_point(made, point);
     faces_.push_back(std::move(made));
+  }
+
+  // The polygons where a heat or a convection acts: where a temperature is given, what came in would go straight out.
+  [[nodiscard]] std::vector<std::uint32_t> left_to(const HeatFace& face,
+                                                   const std::vector<std::uint32_t>& polygons) {
+    if (face.kind == HeatFace::Kind::temperature) return polygons;
+    std::vector<std::uint32_t> left;
+    double whole = 0, lost = 0;
+    const HeatFace* by = nullptr;
+    for (const std::uint32_t p : polygons) {
+      const double area = area_vector(body_.surface.vertices, body_.surface.polygon(p)).norm();
+      whole += area;
+      if (held_[p] == nullptr) {
+        left.push_back(p);
+        continue;
+      }
+      lost += area;
+      by = held_[p];
+    }
+    if (by != nullptr && face.kind != HeatFace::Kind::convection)
+      warnings_.push_back(
+          fmt::format("\"{}\" acts on {} of its area only: the rest has the temperature of \"{}\" ({}), and "
+                      "heat that came in there "
+                      "would go straight out{}",
+                      face.name, human_share(1 - lost / whole), by->name, by->origin,
+                      face.kind == HeatFace::Kind::power ? "; its power is that of what is left" : ""));
+    return left;
   }
 
   void add_point(const FaceOfCells& face, const FacePoint& point) {
@@ -403,7 +431,8 @@ class Conduction {
   std::vector<Eigen::Triplet<double>> entries_;
   Eigen::VectorXd right_, temperature_;
   std::vector<FaceOfCells> faces_;
-  std::string warning_;
+  std::vector<const HeatFace*> held_;  // (polygons) whose temperature is given, by what; else null
+  std::vector<std::string> warnings_;
 };
 
 }  // namespace
@@ -413,7 +442,7 @@ void conduct(Body& body, const Scene& scene, Progress& progress) {
   Thermal::refuse_unfit(scene.get<Thermal>(), body, models_of_parts(scene, body),
                         materials_of_parts(scene, body));
   Conduction conduction(body, scene);
-  if (!conduction.warning().empty()) progress.warn(scene.name + ": " + conduction.warning());
+  for (const std::string& warning : conduction.warnings()) progress.warn(scene.name + ": " + warning);
   const std::vector<double> temperature = conduction.solve(progress);
   const std::vector<double> heat = conduction.heat();
   const auto [low, high] = conduction.range();

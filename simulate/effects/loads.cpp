@@ -60,8 +60,8 @@ void spread(const InterpolationWeights& at, const Vec3& force, std::vector<Vec3>
 std::vector<SurfacePoint> points_under(const Load& load, const std::vector<std::uint32_t>& polygons,
                                        const Problem& problem) {
   // what turns depends on second moments, which gathered points do not keep
-  std::vector<SurfacePoint> points =
-      load.follower ? surface_points(problem, polygons) : gathered_surface_points(problem, polygons);
+  std::vector<SurfacePoint> points = load.follower ? shared_evenly(problem, surface_points(problem, polygons))
+                                                   : gathered_surface_points(problem, polygons);
   if (!(total_area(points) > 0))
     throw InputError(
         load.origin,

@@ -134,7 +134,7 @@ void Supports::make_link(Tie& tie, const Selected& selected, const Problem& prob
 
 void Supports::add_surface_tie(std::uint32_t tie, const std::vector<std::uint32_t>& polygons,
                                const Problem& problem) {
-  const std::vector<SurfacePoint> points = surface_points(problem, polygons);
+  const std::vector<SurfacePoint> points = shared_evenly(problem, surface_points(problem, polygons));
   if (!(total_area(points) > 0))
     throw InputError(ties_[tie].origin,
                      fmt::format("\"{}\": no matter lies under the selected surface; use a smaller spacing",

@@ -45,6 +45,7 @@ constexpr double kLoweringIncrement = 1.0 / 32;    // from this one on energy-lo
 constexpr int kEasyIterations = 10;
 constexpr int kFullStepIterations = 20;
 constexpr int kIterations = 100;            // of Newton in a run, unless the scene says
+constexpr int kTimesWithLinks = 7;          // of those with rigid links
 constexpr int kUnilateralIterations = 300;  // likewise where surfaces touch: some attempts go through
 constexpr int kOverloadIterations = 40;     // likewise where the load is out of proportion
 constexpr int kIterationsPerLoadStep = 10;  // that one which ends in equilibrium adds to those of the run
@@ -207,7 +208,9 @@ class LoadStepping {
 
 int LoadStepping::iterations_left() const {
   const int usual = unilateral_ ? kUnilateralIterations : kIterations;
-  const int allowed = settings_.newton_iterations.value_or(overloaded() ? kOverloadIterations : usual);
+  const bool linked = !links_now(mechanics_.constraints()).empty();  // each of their steps is an equilibrium
+  const int allowed = settings_.newton_iterations.value_or((linked ? kTimesWithLinks : 1) *
+                                                           (overloaded() ? kOverloadIterations : usual));
   const int more = unilateral_ ? kIterationsPerUnilateralStep : kIterationsPerLoadStep;
   return allowed + more * result_.load_steps + kPushedIterations * pushes_ + spent_ -
          result_.newton_iterations;

@@ -5,18 +5,23 @@
 // linear solution per number with one preconditioner, and db/dq is the difference of b along (x, dq). It is
 // kept as long as it serves and mended by what each step shows (Broyden 1965). So the body's system is as
 // well conditioned as one with held faces, and a small deflection needs one equilibrium and six linear
-// solutions a link. Differences are central; their steps are a 1e-7 of the reach.
+// solutions a link. Differences are central, over two steps (Richardson), of 1e-4 of the smaller of reach and spacing: what
+// is cut off and what rounding leaves are both some 1e-12 of the elements' stiffness then, which a cantilever thousands of
+// times as long as thick still has.
 #include "simulate/equilibrium/rigid_link_equilibrium.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 #include "base/error.h"
 #include "base/math/dense.h"
 #include "base/parallel.h"
 #include "base/stop.h"
+#include "simulate/conditions/link_stability.h"
 #include "simulate/linear/conjugate_gradients.h"
 #include "simulate/linear/multigrid.h"
 #include "simulate/linear/vector_products.h"
@@ -28,13 +33,17 @@ constexpr int kMostLinkSteps = 12;    // steps of the links
 constexpr double kLooser = 10;        // tolerance of the links over that of the elements
 constexpr double kServes = 0.1;       // a step that leaves more than this of b: take the slope anew
 constexpr double kAstray = 4;         // ... and more than this: give up
-constexpr double kDifference = 1e-7;  // of the reach
+constexpr double kDifference = 1e-4;  // of the reach, or the spacing where that is smaller
 constexpr double kResponse = 1e-8;    // relative residual of the linear solutions
 constexpr int kMaxLinkCgIterations = 3000;
-// Of the elements' mean stiffness: nothing resists. A cantilever a thousand times as long as thick has that.
-constexpr double kFree = 1e-9;
+// Of the elements' mean stiffness, some times what differences leave: nothing resists.
+constexpr double kFree = 1e-11;
 constexpr double kSlopeShare = 0.5;  // of the run's time: the first slope
 constexpr double kOthers = 1e-3;     // of the links' loads: other loads count
+
+// The derivative of f: sum of weight f(steps h) / h.
+constexpr std::array<std::pair<double, double>, 4> kCentral = {
+    {{1, 2. / 3}, {-1, -2. / 3}, {2, -1. / 12}, {-2, 1. / 12}}};
 
 using LinkVector = Eigen::VectorXd;
 
@@ -66,13 +75,14 @@ class Balance {
 
   NewtonOutcome run();
   // links_are_stable()
-  bool stable(const Preconditioner& preconditioner);
+  std::optional<bool> stable(const Preconditioner& preconditioner);
 
  private:
   [[nodiscard]] Eigen::Index unknowns() const { return static_cast<Eigen::Index>(6 * links_.size()); }
   // The elements' equilibrium, which takes the run from one share of its time to another.
   NewtonOutcome settle(double from, double to);
   void move(const LinkVector& step);
+  [[nodiscard]] double difference(Eigen::Index j) const;  // m
   [[nodiscard]] State led(const std::vector<Vec3>& response, double step) const;
   LinkVector lacking(const State& state);
   std::vector<Vec3> free_forces(const State& state);
@@ -102,6 +112,12 @@ void Balance::move(const LinkVector& step) {
     links_[l]->translation += step.segment<3>(at);
     links_[l]->turn += step.segment<3>(at + 3) / links_[l]->reach;
   }
+}
+
+double Balance::difference(Eigen::Index j) const {
+  double least = links_[static_cast<std::size_t>(j / 6)]->reach;
+  for (const Part& part : mechanics_.body().parts) least = std::min(least, part.lattice.spacing.minCoeff());
+  return kDifference * least;
 }
 
 // `state_`, its free elements moved by step * response, the others led to where the links are.
@@ -141,15 +157,20 @@ std::vector<Vec3> Balance::free_forces(const State& state) {
 
 // One column of db/dq. False when the tangent has negative curvature.
 bool Balance::add_column(const Preconditioner& preconditioner, Eigen::Index j, Eigen::MatrixXd& slope) {
-  const double step = kDifference * links_[static_cast<std::size_t>(j / 6)]->reach;
+  const double step = difference(j);
   const LinkVector along = LinkVector::Unit(unknowns(), j) * step;
   const std::vector<Vec3> none;
-  move(along);
-  std::vector<Vec3> pushed = free_forces(led(none, 0));
-  move(-2 * along);
-  const std::vector<Vec3> back = free_forces(led(none, 0));
-  move(along);
-  for (std::size_t e = 0; e < pushed.size(); ++e) pushed[e] = (pushed[e] - back[e]) / (2 * step);
+  const auto at = [&](double steps, const std::vector<Vec3>& answer) {
+    move(steps * along);
+    return led(answer, steps * step);
+  };
+  std::vector<Vec3> pushed;
+  for (const auto& [steps, weight] : kCentral) {
+    const std::vector<Vec3> forces = free_forces(at(steps, none));
+    move(-steps * along);
+    pushed.resize(forces.size(), Vec3::Zero());
+    for (std::size_t e = 0; e < pushed.size(); ++e) pushed[e] += weight / step * forces[e];
+  }
   std::vector<Vec3> response(pushed.size(), Vec3::Zero());
   const LinearResult solved = conjugate_gradients(
       mechanics_.tangent(), pushed, response, preconditioner, kResponse, kMaxLinkCgIterations,
@@ -161,12 +182,10 @@ bool Balance::add_column(const Preconditioner& preconditioner, Eigen::Index j, E
       });
   outcome_.cg_iterations += solved.iterations;
   if (solved.indefinite) return false;
-  move(along);
-  const LinkVector ahead = lacking(led(response, step));
-  move(-2 * along);
-  const LinkVector behind = lacking(led(response, -step));
-  move(along);
-  slope.col(j) = (ahead - behind) / (2 * step);
+  for (const auto& [steps, weight] : kCentral) {
+    slope.col(j) += weight / step * lacking(at(steps, response));
+    move(-steps * along);
+  }
   std::vector<Vec3> resisted(pushed.size());
   multiply(mechanics_.tangent(), response, resisted);
   for (std::size_t e = 0; e < pushed.size(); ++e) pushed[e] -= resisted[e];
@@ -217,15 +236,12 @@ Eigen::MatrixXd Balance::slope() {
   return slope;
 }
 
-// By spins in place of changes of the rotation vectors: with loads that have an energy the slope is symmetric then.
-bool Balance::stable(const Preconditioner& preconditioner) {
+std::optional<bool> Balance::stable(const Preconditioner& preconditioner) {
   Eigen::MatrixXd slope;
-  if (!take_slope(preconditioner, slope)) return false;
-  for (std::size_t l = 0; l < links_.size(); ++l) {
-    const auto at = static_cast<Eigen::Index>(6 * l + 3);
-    slope.middleCols<3>(at) = (slope.middleCols<3>(at) * links_[l]->spin_of_turn().inverse()).eval();
-  }
-  return eigenvalues_symmetric(-0.5 * (slope + slope.transpose())).minCoeff() > 0;
+  if (!take_slope(preconditioner, slope)) return std::nullopt;
+  std::vector<const RigidLink*> links;
+  for (const auto& link : links_) links.push_back(link.get());
+  return link_motions_are_stable(slope, links);
 }
 
 void Balance::refuse_free(const Eigen::MatrixXd& slope) const {

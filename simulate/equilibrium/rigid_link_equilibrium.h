@@ -15,9 +15,9 @@ namespace flexel::simulate {
                                               NewtonMemory* memory = nullptr);
 
 // Whether motions of the rigid links, the elements following, raise the energy at an equilibrium, whose positive tangent
-// Mechanics::tangent() holds, eliminated. A moment that keeps its direction has no energy: the symmetric part of its
-// stiffness counts. True without links. Nothing: the run is to stop, under a StopWaits too, or a load that follows acts beside
-// links, which the tangent does not have.
+// Mechanics::tangent() holds, eliminated (simulate/conditions/link_stability.h). True without links. Nothing: a torque that
+// keeps its direction has no energy, and what is known does not tell; the run is to stop, under a StopWaits too; or a load
+// that follows acts beside links, which the tangent does not have.
 [[nodiscard]] std::optional<bool> links_are_stable(Mechanics& mechanics, State state,
                                                    const Preconditioner& preconditioner);
 

@@ -24,7 +24,7 @@ namespace {
 constexpr double kLeastShare = 0.05;      // of the run, the least time unless the scene gives one
 constexpr double kNear = 0.25, kFar = 1;  // spacings: a gap that makes finer, and one that keeps fine
 constexpr double kMostPressed = 0.1;      // spacings, of a part that changes
-constexpr std::size_t kPerPart = 6;       // values of memory()
+constexpr std::size_t kPerPart = 7;       // values of memory(); 6 in checkpoints without the last
 
 // Whether a coarser lattice of the part would have another energy than this one, by more than that share.
 bool would_change_energy(const Problem& problem, const State& state, std::uint32_t part, double internal,
@@ -175,12 +175,13 @@ std::vector<double> AdaptiveResolution::memory() const {
   std::vector<double> memory{looked_};
   for (const PartLevel& of : parts_)
     memory.insert(memory.end(), {static_cast<double>(of.part), static_cast<double>(of.level), of.changed,
-                                 of.coarsened ? 1.0 : 0.0, of.calm_since, of.largest});
+                                 of.coarsened ? 1.0 : 0.0, of.calm_since, of.largest, of.no_room});
   return memory;
 }
 
 void AdaptiveResolution::restore(const std::vector<double>& memory) {
-  if (memory.size() != 1 + kPerPart * parts_.size())
+  const std::size_t each = memory.size() == 1 + (kPerPart - 1) * parts_.size() ? kPerPart - 1 : kPerPart;
+  if (memory.size() != 1 + each * parts_.size())
     throw InputError(
         "the checkpoint's memory of [adaptive] is not that of its scene and body: it is damaged");
   looked_ = memory[0];
@@ -193,7 +194,8 @@ void AdaptiveResolution::restore(const std::vector<double>& memory) {
     of.coarsened = from[3] != 0;
     of.calm_since = from[4];
     of.largest = from[5];
-    from += kPerPart;
+    if (each == kPerPart) of.no_room = from[6];
+    from += each;
   }
 }
 

@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kRingBegins = 1.5;  // voxels, from any point of the middle one to a centre in the ring
 constexpr double kReach = 2;         // voxels
+constexpr double kSameNear = 1e-7;   // voxels: distances that differ by rounding
 
 std::uint32_t part_of_element(const Body& body, std::uint32_t element) {
   std::uint32_t part = 0;
@@ -98,10 +99,15 @@ std::vector<std::uint32_t> NearestElement::elements_around(std::int32_t from, st
 }
 
 std::optional<std::uint32_t> NearestElement::operator()(const Vec3& point, const Vec3& outward) {
+  const std::span<const std::uint32_t> found = all(point, outward);
+  return found.empty() ? std::nullopt : std::optional(*std::min_element(found.begin(), found.end()));
+}
+
+std::span<const std::uint32_t> NearestElement::all(const Vec3& point, const Vec3& outward) {
   const Body& body = problem_.body;
   const Lattice& lattice = body.parts[part_].lattice;
   const Vec3 at = lattice.to_lattice(point);
-  const double h = lattice.spacing.mean();
+  const double h = lattice.spacing.mean(), same = kSameNear * h;
   const Index3 home{static_cast<std::int32_t>(std::floor(at[0])),
                     static_cast<std::int32_t>(std::floor(at[1])),
                     static_cast<std::int32_t>(std::floor(at[2]))};
@@ -110,23 +116,28 @@ std::optional<std::uint32_t> NearestElement::operator()(const Vec3& point, const
     near_ = elements_around(0, 1);
     in_ring_.reset();
   }
-  std::optional<std::uint32_t> nearest;
+  tied_.clear();
   double least = kReach * h;
   bool inside = false;
+  const double on_surface = same * outward.norm();
   const auto look = [&](std::uint32_t e) {
     const Vec3 way = body.rest[e] - point;
-    const bool inward = outward.dot(way) <= 0;
+    const bool inward = outward.dot(way) <= on_surface;
     const double distance = way.norm();
-    if (distance > kReach * h || (inside && !inward) || (inside == inward && !(distance < least))) return;
-    nearest = e;
-    least = distance;
+    if (distance > kReach * h || (inside && !inward) || (inside == inward && distance > least + same)) return;
+    if (inside != inward || distance < least - same) {
+      tied_.clear();
+      least = distance;
+    }
+    least = std::min(least, distance);
+    tied_.push_back(e);
     inside = inward;
   };
   std::for_each(near_.begin(), near_.end(), look);
-  if (inside && least <= kRingBegins * h) return nearest;
+  if (inside && least <= kRingBegins * h) return tied_;
   if (!in_ring_) in_ring_ = elements_around(2, 2);
   std::for_each(in_ring_->begin(), in_ring_->end(), look);
-  return nearest;
+  return tied_;
 }
 
 std::optional<std::uint32_t> nearest_element(const Problem& problem, std::uint32_t part, const Vec3& point,
@@ -148,6 +159,10 @@ std::optional<InterpolationWeights> SurfaceCarriers::operator()(const Vec3& poin
   const auto element = nearest_(point, outward);
   if (!element) return std::nullopt;
   return InterpolationWeights{{*element}, {1}, 1};
+}
+
+std::span<const std::uint32_t> SurfaceCarriers::tied(const Vec3& point, const Vec3& outward) {
+  return locate_ ? std::span<const std::uint32_t>() : nearest_.all(point, outward);
 }
 
 std::optional<InterpolationWeights> carrier_on_surface(const Problem& problem, std::uint32_t polygon,

@@ -5,6 +5,7 @@
 // (affine, exact for affine displacements).
 #pragma once
 #include <optional>
+#include <span>
 
 #include "formats/lattice/locate.h"
 #include "simulate/state/state.h"
@@ -25,8 +26,11 @@ class NearestElement {
  public:
   NearestElement(const Problem& problem, std::uint32_t part) : problem_(problem), part_(part) {}
   // Nothing where none lies within two voxels. Those with outward . (element - point) <= 0 go before all
-  // others; a zero vector tells none apart.
+  // others; a zero vector tells none apart. Of several equally near the lowest.
   [[nodiscard]] std::optional<std::uint32_t> operator()(const Vec3& point, const Vec3& outward);
+  // All that are equally near, whatever rounding says: of a point half-way between two elements both. Good until the next
+  // call.
+  [[nodiscard]] std::span<const std::uint32_t> all(const Vec3& point, const Vec3& outward);
 
  private:
   [[nodiscard]] std::vector<std::uint32_t> elements_around(std::int32_t from, std::int32_t to) const;
@@ -36,6 +40,7 @@ class NearestElement {
   std::optional<Index3> home_;                         // voxel that the others are of
   std::vector<std::uint32_t> near_;                    // in the 27 voxels around
   std::optional<std::vector<std::uint32_t>> in_ring_;  // in the 98 around these, once they are asked for
+  std::vector<std::uint32_t> tied_;                    // found
 };
 
 // What carries `point` (m, rest, world frame) on polygon `polygon` of the surface, `outward` the polygon's
@@ -50,6 +55,9 @@ class SurfaceCarriers {
  public:
   SurfaceCarriers(const Problem& problem, std::uint32_t polygon);
   [[nodiscard]] std::optional<InterpolationWeights> operator()(const Vec3& point, const Vec3& outward);
+  // The elements that carry a point at centre placement together, as it is equally near to all of them; empty: operator()
+  // tells what carries it. Good until the next call.
+  [[nodiscard]] std::span<const std::uint32_t> tied(const Vec3& point, const Vec3& outward);
 
  private:
   const Problem& problem_;

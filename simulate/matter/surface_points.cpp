@@ -9,6 +9,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <numeric>
+#include <optional>
+#include <span>
 
 #include "base/parallel.h"
 
@@ -17,6 +19,8 @@ namespace {
 
 constexpr double kLongestEdge = 0.3;  // of a piece, in spacings
 constexpr double kThreadShare = 32;   // longest edge of what one thread cuts at a time, in those of a piece
+constexpr double kSameEdge =
+    1e-9;  // squared edges that differ by rounding alone: where a part lies decides nothing
 
 using Corners = std::array<Vec3, 3>;
 
@@ -31,12 +35,12 @@ void for_each_piece(const Corners& triangle, double longest, const Each& each) {
     double squared = 0;
     for (std::size_t e = 0; e < 3; ++e) {
       const double length = (corners[(e + 1) % 3] - corners[e]).squaredNorm();
-      if (length > squared) {
+      if (length > (1 + kSameEdge) * squared) {
         squared = length;
         edge = e;
       }
     }
-    if (!(squared > longest * longest)) {
+    if (!(squared > (1 + kSameEdge) * longest * longest)) {
       each(corners);
       continue;
     }
@@ -101,6 +105,16 @@ SurfacePoint point_of(SurfaceCarriers& carriers, std::uint32_t polygon, const Co
 // Sums of a share's points by what carries them: of area, and of area times position and weights.
 class Gathered {
  public:
+  // A point that is equally near to several elements (centre placement) goes with each by an equal share.
+  void add(SurfacePoint point, std::span<const std::uint32_t> tied) {
+    if (tied.size() < 2) return add(point);
+    point.area_vector /= static_cast<double>(tied.size());
+    for (const std::uint32_t element : tied) {
+      point.at.elements[0] = element;
+      add(point);
+    }
+  }
+
   void add(const SurfacePoint& point) {
     const double area = point.area_vector.norm();
     if (point.at.count == 0 || !(area > 0)) return;
@@ -194,13 +208,35 @@ std::vector<SurfacePoint> gathered_surface_points(const Problem& problem,
         Gathered sums;
         SurfaceCarriers carriers(problem, shares[s].polygon);
         for_each_piece(shares[s].corners, longest_edge(problem.body, shares[s].polygon),
-                       [&](const Corners& piece) { sums.add(point_of(carriers, shares[s].polygon, piece)); });
+                       [&](const Corners& piece) {
+                         const SurfacePoint point = point_of(carriers, shares[s].polygon, piece);
+                         sums.add(point, carriers.tied(point.position, point.area_vector));
+                       });
         gathered[s] = sums.take();
       },
       16);
   std::vector<SurfacePoint> points;
   for (const std::vector<SurfacePoint>& share : gathered)
     points.insert(points.end(), share.begin(), share.end());
+  return points;
+}
+
+std::vector<SurfacePoint> shared_evenly(const Problem& problem, std::vector<SurfacePoint> points) {
+  std::optional<SurfaceCarriers> carriers;
+  std::optional<std::uint32_t> polygon;
+  const std::size_t count = points.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (points[i].at.count != 1) continue;
+    if (polygon != points[i].polygon) carriers.emplace(problem, *(polygon = points[i].polygon));
+    const std::span<const std::uint32_t> tied = carriers->tied(points[i].position, points[i].area_vector);
+    if (tied.size() < 2) continue;
+    points[i].area_vector /= static_cast<double>(tied.size());
+    for (std::size_t t = 0; t < tied.size(); ++t) {
+      SurfacePoint share = points[i];
+      share.at.elements[0] = tied[t];
+      t == 0 ? static_cast<void>(points[i] = share) : points.push_back(share);
+    }
+  }
   return points;
 }
 

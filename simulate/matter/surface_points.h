@@ -26,9 +26,14 @@ struct SurfacePoint {
 
 // The same quadrature in few points, for what is linear in position and weights: of the points that one cell
 // (one element) carries within a piece of a polygon of some ten spacings, the mean by area. Sums of area, of
-// area times position and of area times weights stay as they are.
+// area times position and of area times weights stay as they are. At centre placement a point equally near to several
+// elements goes with all of them by equal shares, so that rounding, as of another origin, decides nothing.
 [[nodiscard]] std::vector<SurfacePoint> gathered_surface_points(const Problem& problem,
                                                                 const std::vector<std::uint32_t>& polygons);
+
+// Of these, points at centre placement that are equally near to several elements go with all of them by equal shares too.
+[[nodiscard]] std::vector<SurfacePoint> shared_evenly(const Problem& problem,
+                                                      std::vector<SurfacePoint> points);
 
 // How many points the surface of each part has, (parts), those that nothing carries among them: for what they will take.
 [[nodiscard]] std::vector<std::size_t> surface_point_counts(const Body& body);

@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/math/dense.h"
 #include "base/parallel.h"
+#include "simulate/conditions/link_stability.h"
 #include "simulate/linear/vector_products.h"
 
 namespace flexel::simulate {
@@ -337,16 +338,11 @@ bool LinkBalance::balance(LinkedNodes& nodes, double share, double safety, doubl
   return left.norm() <= asked * scale;
 }
 
-// By spins in place of changes of the rotation vectors.
-bool LinkBalance::stable(LinkedNodes& nodes, double share, double safety) {
-  if (!find_slope(nodes, share, safety)) return false;
-  Eigen::MatrixXd slope = slope_;
-  for (std::size_t l = 0; l < system_.linked().size(); ++l) {
-    const RigidLink& link = *system_.linked()[l]->tie->motion.link;
-    const auto at = static_cast<Eigen::Index>(6 * l + 3);
-    slope.middleCols<3>(at) = (slope.middleCols<3>(at) * link.spin_of_turn().inverse()).eval();
-  }
-  return eigenvalues_symmetric(-0.5 * (slope + slope.transpose())).minCoeff() > 0;
+std::optional<bool> LinkBalance::stable(LinkedNodes& nodes, double share, double safety) {
+  if (!find_slope(nodes, share, safety)) return std::nullopt;
+  std::vector<const RigidLink*> links;
+  for (const auto& linked : system_.linked()) links.push_back(linked->tie->motion.link.get());
+  return link_motions_are_stable(slope_, links);
 }
 
 }  // namespace flexel::simulate

@@ -39,8 +39,9 @@ class LinkBalance {
   // Moves the links and the nodes, which are in equilibrium, until no more than `tolerance` of the forces is lacking at `share` of the
   // load. False: it was not found. Throws InputError, named for the link, where nothing resists a motion of it.
   [[nodiscard]] bool find(LinkedNodes& nodes, double share, double safety, double tolerance);
-  // Whether motions of the links raise the energy, at an equilibrium.
-  [[nodiscard]] bool stable(LinkedNodes& nodes, double share, double safety);
+  // Whether an equilibrium is stable in the motions of the links (simulate/conditions/link_stability.h). Nothing: that does
+  // not tell.
+  [[nodiscard]] std::optional<bool> stable(LinkedNodes& nodes, double share, double safety);
 
  private:
   [[nodiscard]] Eigen::VectorXd lacking(const LinkedNodes& nodes, double share, double safety) const;

@@ -135,7 +135,8 @@ class LargeDeflection {
   std::optional<bool> links_stable(std::vector<Vec3> u) {
     if (!links_.any()) return true;
     LinkedNodes nodes = linked_nodes(u, 1, [] { return true; });
-    return links_.stable(nodes, 1, solution_.safety) ? std::optional(true) : not_positive();
+    const std::optional<bool> stable = links_.stable(nodes, 1, solution_.safety);
+    return stable == false ? not_positive() : stable;
   }
   // Not stable; but where the symmetric part is not positive, loads that follow may still leave it so.
   [[nodiscard]] std::optional<bool> not_positive() const {

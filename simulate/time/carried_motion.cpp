@@ -28,6 +28,27 @@ PartMomenta momenta_of(const Body& body, const Part& part, const State& state,
   return sum;
 }
 
+// J: of a rigid body with the inertia and the angular momentum that the part has about its centre of mass.
+double spin_energy(const Body& body, const Part& part, const State& state, const std::vector<double>& mass) {
+  double sum = 0;
+  Vec3 centre = Vec3::Zero();
+  const auto place = [&](std::uint32_t e) -> Vec3 { return body.rest[e] + state.displacement[e]; };
+  for (std::uint32_t e = part.element_begin; e < part.element_end; ++e) {
+    sum += mass[e];
+    centre += mass[e] * place(e);
+  }
+  if (!(sum > 0)) return 0;
+  centre /= sum;
+  Mat3 inertia = Mat3::Zero();
+  Vec3 angular = Vec3::Zero();
+  for (std::uint32_t e = part.element_begin; e < part.element_end; ++e) {
+    const Mat3 arm = cross_matrix(place(e) - centre);
+    inertia -= mass[e] * arm * arm;
+    angular += mass[e] * arm * state.velocity[e];
+  }
+  return 0.5 * angular.dot(Vec3(solve_least_norm(inertia, angular)));
+}
+
 // Rigid motions of what is held nowhere.
 class FreeMotions {
  public:
@@ -76,7 +97,10 @@ class FreeMotions {
 
 CarriedMotion::CarriedMotion(const Problem& problem, const State& state, double stored) {
   const std::vector<double> mass = lumped_masses(problem);
-  for (const Part& part : problem.body.parts) momenta_.push_back(momenta_of(problem.body, part, state, mass));
+  for (const Part& part : problem.body.parts) {
+    momenta_.push_back(momenta_of(problem.body, part, state, mass));
+    spin_.push_back(spin_energy(problem.body, part, state, mass));
+  }
   const auto [internal, kinetic] = internal_and_kinetic(problem, state);
   internal_ = internal + stored;
   kinetic_ = kinetic;
@@ -97,6 +121,24 @@ void CarriedMotion::give_back(const Problem& problem, const std::vector<std::uin
   }
 }
 
+// Angular momentum stays, so the energy of a spin goes by the inverse of the moment of inertia, as its speed does.
+void CarriedMotion::warn_of_spin(const Problem& problem, const State& state, const std::string& origin,
+                                 Progress& progress) const {
+  constexpr double kNoticeable = 1e-3;  // of the energy
+  const std::vector<double> mass = lumped_masses(problem);
+  for (std::size_t p = 0; p < spin_.size(); ++p) {
+    if (!(spin_[p] > kNoticeable * (internal_ + kinetic_))) continue;
+    const Part& part = problem.body.parts[p];
+    const double change = spin_energy(problem.body, part, state, mass) / spin_[p] - 1;
+    if (!(std::abs(change) > kLargestEnergyChange)) continue;
+    progress.warn(
+        fmt::format("{}: part \"{}\" spins {:.2g} % {} on its new lattice, on which it has another moment of "
+                    "inertia; its angular "
+                    "momentum stays: smaller cells change less, or leave its lattice as it is",
+                    origin, part.name, 100 * std::abs(change), change < 0 ? "slower" : "faster"));
+  }
+}
+
 std::string CarriedMotion::change_of_energy(const Problem& problem, const State& state, double stored,
                                             double borne, const std::string& origin,
                                             Progress& progress) const {
@@ -106,6 +148,7 @@ std::string CarriedMotion::change_of_energy(const Problem& problem, const State&
         fmt::format("{}: on the new lattice a cell is folded: change the resolution where the "
                     "body is deformed less",
                     origin));
+  warn_of_spin(problem, state, origin, progress);
   if (!(internal_ > kKineticRounding * kinetic_)) return "";
   const double change = now / internal_ - 1;
   if (std::abs(change) > borne)

@@ -68,6 +68,9 @@ TEST(Outputs, NamesOfManyFilesKeepInputs) {
   EXPECT_TRUE(refused("a[1]*.PVD", frame));
   EXPECT_TRUE(refused("a[1]*_{frame}.vtu", frame));
   EXPECT_TRUE(refused("{part}.vtu", frame));
+  // a program that takes braces as they are
+  EXPECT_NO_THROW(check_outputs({{scratch.path("a[1]*_{frame}.vtu"), false, true}}, {frame}, false));
+  EXPECT_NO_THROW(check_outputs({{scratch.path("{part}.pvd"), false, true}}, {frame}, false));
   EXPECT_FALSE(refused("a[1]*.pvd", other));
   EXPECT_FALSE(refused("a[1]x.pvd", frame));
   EXPECT_FALSE(refused("{part}.stl", frame));

@@ -77,23 +77,53 @@ def test_a_probe_is_of_the_part_that_it_lies_in():
     expect(moved[0] < 0 < min(moved[1:]), f"points of a table likewise: {moved}")
 
 
-def test_a_probe_is_of_the_wall_that_it_lies_in():
-    """Two leaves, nearer to each other than a cell: that which is pushed moves, the other hardly."""
-    outline = [(0, 0), (60, 0), (60, 4), (10, 4), (10, 4.6), (60, 4.6), (60, 8.6), (0, 8.6)]
-    lines = [f"v {x} {y} {z}" for y in (0, 10) for x, z in outline]
+def leaves(low=4.0, high=4.6, y=10.0, root=10.0):
+    """Two leaves on one root, with a slit from z = low to high between them."""
+    outline = [(0, 0), (60, 0), (60, low), (root, low), (root, high), (60, high), (60, 8.6), (0, 8.6)]
+    lines = [f"v {x} {at} {z}" for at in (0, y) for x, z in outline]
     lines += ["f 1 2 3 4 5 6 7 8", "f 16 15 14 13 12 11 10 9"]
     lines += [f"f {i + 1} {i + 9} {(i + 1) % 8 + 9} {(i + 1) % 8 + 1}" for i in range(8)]
     write("leaves.obj", "\n".join(lines) + "\n")
-    text = 'material = "steel"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "zmax"\nforce = [0, 0, "50 N"]\n'
+
+
+UPPER_IS_PUSHED = 'material = "steel"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "zmax"\nforce = [0, 0, "50 N"]\n'
+
+
+def moved_points(points):
+    """z displacements [mm] of points, by flexel-map."""
+    write("points.csv", "x,y,z\n" + "".join(f"{x!r},{y!r},{z!r}\n" for x, y, z in points))
+    expect_ok(run("flexel-map", "o.vtu", "--points", "points.csv", "-o", "moved.csv"))
+    lines = pathlib.Path("moved.csv").read_text().split()[1:]
+    return [float(line.split(",")[2]) - point[2] for line, point in zip(lines, points)]
+
+
+def test_probes_and_points_are_of_the_wall_that_they_lie_in():
+    """Two leaves, nearer to each other than a cell: that which is pushed moves, the other hardly."""
+    leaves()
     heights = (.01, 2, 3.99, 4.61, 4.8, 6, 8.59)
     for size in ("2 mm", "3 mm", "4 mm"):
         for options, model in ((), "cells"), (("--moments",), "quadratic"):
             expect_ok(run("flexel-voxelize", "leaves.obj", "--size", size, "-o", "leaves.vtu", *options))
             for y in (0, 5):
                 probes = "".join(probe(f"at {z}", 60, y, z) for z in heights)
-                found = summary(f'model = "{model}"\n' + text + probes, "leaves.vtu")["probes"]
+                found = summary(f'model = "{model}"\n' + UPPER_IS_PUSHED + probes, "leaves.vtu")["probes"]
                 moved = [each["displacement"][2] for each in found]
                 expect(max(moved[:3]) < .3 * min(moved[3:]), f"{model}, {size}: the lower leaf rests, the upper one goes up: {moved}")
+                mapped = moved_points([(60, y, z) for z in heights])
+                expect(max(mapped[:3]) < .3 * min(mapped[3:]), f"{model}, {size}: and so do points of a table: {mapped}")
+
+
+def test_probes_and_points_in_slivers_go_with_the_matter_there():
+    """Of the lower leaf's top too little is in the voxels that hold the upper leaf for a cell of its own."""
+    leaves(low=4.03, high=4.7, y=8.0)
+    expect_ok(run("flexel-voxelize", "leaves.obj", "--size", "4 mm", "--align", "none", "-o", "leaves.vtu"))
+    points = [(x, y, z) for x in (22.0, 39.0, 58.0) for y in (1.0, 4.5) for z in (3.9, 4.01, 4.03, 4.72, 6.0)]
+    probes = "".join(probe(f"p {i}", *point) for i, point in enumerate(points))
+    found = [each["displacement"][2] for each in summary(UPPER_IS_PUSHED + probes, "leaves.vtu")["probes"]]
+    mapped = moved_points(points)
+    for at in range(0, len(points), 5):
+        expect(max(found[at:at + 3]) < .3 * min(found[at + 3:at + 5]), f"probes at {points[at]}: {found[at:at + 5]}")
+        expect(max(mapped[at:at + 3]) < .3 * min(mapped[at + 3:at + 5]), f"points at {points[at]}: {mapped[at:at + 5]}")
 
 
 def test_places_at_odds_are_refused():

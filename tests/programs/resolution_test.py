@@ -179,6 +179,19 @@ def test_a_plate_that_is_hardly_pressed_changes():
         expect("192 elements became 1125" in told, told)
 
 
+def test_a_spin_that_is_another_on_a_coarser_lattice_is_told():
+    """A cube of n cells has 1 + 2 / n^2 of its moment of inertia: of four cells 1.125 and of two 1.5."""
+    write("cube.stl", binary_stl(box_triangles((20, 20, 20))))
+    expect_ok(run("flexel-voxelize", "cube.stl", "--size", "5 mm", "-o", "cube.vtu"))
+    spin = (GUM.split("[[fix]]")[0] + '[[velocity]]\nwhere = "cube"\nvelocity = [{}, "0 m/s", "0 m/s"]\n'
+            'spin = {{ axis = [0, 0, 1], through = ["10 mm", "10 mm", "10 mm"], angle_per_second = "{} deg" }}\n[run]\ntime = "1 ms"\n'
+            '[[event]]\nat = "0.5 ms"\ndo = "resolution"\nchange = "coarser"\n')
+    for speed, degrees, warned in (("0 m/s", 3600, True), ("1 m/s", 3600, True), ("1 m/s", 0, False)):
+        write("scene.toml", spin.format(f'"{speed}"', degrees))
+        told = expect_ok(run("flexel-simulate", "scene.toml", "cube.vtu", "-o", "out.vtu", "--force")).err
+        expect(('part "cube" spins 25 % slower' in told) == warned, told)
+
+
 def test_a_resumed_run_that_meets_a_floor_has_the_same_bytes():
     """It becomes finer before it touches, bounces, and is as it was at the end; explicit steps, and implicit ones."""
     bent_bar("5 mm")

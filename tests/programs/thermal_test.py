@@ -121,6 +121,17 @@ def test_an_infill_conducts_less():
     near(heat_of(between('infill = "50 %"\nshell = "1 mm"\n')), (walls + (1 - walls) * struts) * solid, 1e-3)
 
 
+def test_heat_beside_a_given_temperature_is_not_lost():
+    """5 W into both ends, one of which has a temperature: all of it comes in at the other, and a warning says so."""
+    text = '[[heat]]\nname = "in"\nwhere = ["xmin", "xmax"]\npower = "5 W"\n'
+    done = expect_ok(between(text, ends=("xmin",)))
+    expect('"in" acts on 50 % of its area only' in done.err and "go straight out" in done.err, done.err)
+    near(heat_of(done), -5, 1e-3)
+    high = float(re.search(r"temperature .* to ([\d.]+) degC", done.err).group(1))
+    near(high - 120, 5 * .04 / (50 * 1e-4), 1e-3)  # q L / k, above what is given
+    near(heat_of(between('[[heat]]\nwhere = "xmax"\npower = "5 W"\n', ends=("xmin",))), -5, 1e-3)
+
+
 def test_below_absolute_zero():
     refused('[[heat]]\nwhere = "xmin"\npower = "-50 W"\n[[convection]]\nwhere = "xmax"\ncoefficient = "10 W/(m2 K)"\n'
             'ambient = "20 degC"', "below absolute zero", "degC")

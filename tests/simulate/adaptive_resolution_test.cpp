@@ -168,6 +168,31 @@ TEST(AdaptiveResolution, GoesOnFromItsMemory) {
   EXPECT_THROW(whole.restore({1, 2}), InputError);
 }
 
+// Room that lacked once is not asked for again until the body has fewer elements, in a resumed run as in the whole one.
+TEST(AdaptiveResolution, RemembersThatThereWasNoRoom) {
+  const Body body = box_body(turned_box({8, 2, 4}, 1e-3));
+  const Problem problem = testing::problem_of(body, kCauchyGum);
+  Progress quiet("test", Progress::Mode::quiet);
+  AdaptiveSettings settings;
+  settings.most_elements = static_cast<double>(body.element_count()) + 1;
+  AdaptiveResolution whole(settings, body, 1);
+  State state = bent(body, 1e4 * settings.strain_jump);
+  state.time = 0;
+  EXPECT_FALSE(whole.look(problem, state, std::vector<PartTouch>(1), quiet));
+  // What allows more asks whether the memory holds: the whole run does not look for room again.
+  settings.most_elements.reset();
+  AdaptiveResolution resumed(settings, body, 1), anew(settings, body, 1);
+  resumed.restore(whole.memory());
+  state.time = 0.1;
+  EXPECT_TRUE(anew.look(problem, state, std::vector<PartTouch>(1), quiet));
+  EXPECT_FALSE(resumed.look(problem, state, std::vector<PartTouch>(1), quiet));
+  std::vector<double> older = whole.memory();  // as checkpoints had it before
+  older.pop_back();
+  AdaptiveResolution from_older(settings, body, 1);
+  from_older.restore(older);
+  EXPECT_TRUE(from_older.look(problem, state, std::vector<PartTouch>(1), quiet));
+}
+
 // What is pressed stays: its contacts would store another energy.
 TEST(AdaptiveResolution, APressedPartStays) {
   const Body body = box_body(turned_box({6, 2, 2}, 1e-3));

@@ -6,10 +6,13 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cmath>
+#include <numbers>
 
 #include "base/error.h"
 #include "base/program/brief_output.h"
+#include "simulate/conditions/link_stability.h"
 #include "simulate/result/options.h"
 #include "simulate/result/result.h"
 #include "simulate/scene/scene.h"
@@ -206,6 +209,56 @@ TEST(RigidLink, AColumnThatBucklesWithItsLinkIsTold) {
     EXPECT_EQ(told.find("not stable") == std::string::npos, each.stable)
         << each.model << ", arm " << each.arm << ", load " << each.load << ": " << told;
   }
+}
+
+// A torque that keeps its direction has no energy: where its stiffness is not symmetric, the symmetric part that drives a motion
+// away is no proof.
+TEST(RigidLink, WhatATorqueWithoutEnergyDoesIsNotClaimed) {
+  const RigidLink link;
+  const std::array<const RigidLink*, 1> links = {&link};
+  const auto asked = [&](double first, double second, double skew) {
+    Eigen::MatrixXd resists = Eigen::MatrixXd::Identity(6, 6);
+    resists(4, 4) = first;
+    resists(5, 5) = second;
+    resists(4, 5) = skew;
+    resists(5, 4) = -skew;
+    return link_motions_are_stable(-resists, links);
+  };
+  EXPECT_EQ(asked(1, 2, 0), true);
+  EXPECT_EQ(asked(1, 2, 5), true);  // nothing branches off, whatever is without energy
+  EXPECT_EQ(asked(-1, 2, 0), false);
+  EXPECT_EQ(asked(-1, -2, 0), false);
+  EXPECT_EQ(asked(-1, -2, 1e-9), false);  // as differences leave it
+  EXPECT_EQ(asked(-1, 2, 1), false);      // its determinant is below 0
+  EXPECT_EQ(asked(-1, 2, 2), std::nullopt);
+  EXPECT_EQ(asked(-1, -2, 1), std::nullopt);
+}
+
+// The end of a wire a thousand times as long as thick goes as far through its rigid link as without one; free, it is told from
+// that.
+TEST(RigidLink, AWireResistsAndAFreeOneDoesNot) {
+  const testing::BoxOptions options{.cells = {400, 2, 2}, .spacing = Vec3(0.0025, 0.0005, 0.0005)};
+  const std::string force = "force = [0, 0, \"1e-5 N\"]";
+  Body linked = testing::box_body(options), averaged = testing::box_body(options),
+       free = testing::box_body(options);
+  const SimulateResult through = solve(linked, kNoContraction + (kHeld + link(force)));
+  const SimulateResult without = solve(averaged, kNoContraction + (kHeld + link(force, "averaging")));
+  EXPECT_NEAR(through.largest_displacement, without.largest_displacement,
+              1e-3 * without.largest_displacement);
+  EXPECT_THROW((void)solve(free, kNoContraction + link(force)), InputError);
+}
+
+// Even bending: the angle is that of the torque however far it goes.
+TEST(RigidLink, AStripIsRolledByAQuarterTurn) {
+  const testing::BoxOptions options{.cells = {40, 3, 1}, .spacing = Vec3(0.0025, 0.0033, 0.001)};
+  const auto rolled = [&](double torque) {
+    Body body = testing::box_body(options);
+    const SimulateResult found =
+        solve(body, kNoContraction + (kHeld + link(fmt::format("torque = [0, \"{} N m\", 0]", -torque))));
+    return -found.loads.at(0).rotation->y();
+  };
+  const double quarter = 0.5 * std::numbers::pi;
+  EXPECT_NEAR(rolled(quarter / rolled(1e-3) * 1e-3), quarter, 0.01 * quarter);
 }
 
 // Nothing holds the bar but the link, of a lattice that fits it and of one that is turned against its
