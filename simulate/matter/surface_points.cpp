@@ -19,14 +19,18 @@ namespace {
 
 constexpr double kLongestEdge = 0.3;  // of a piece, in spacings
 constexpr double kThreadShare = 32;   // longest edge of what one thread cuts at a time, in those of a piece
-constexpr double kSameEdge =
-    1e-9;  // squared edges that differ by rounding alone: where a part lies decides nothing
+
+// How a triangle is cut. Squared edges that differ by less than the share `same` are one: where a part lies decides nothing.
+struct Cut {
+  double longest = 0;  // m, edge of a piece
+  double same = 0;
+};
 
 using Corners = std::array<Vec3, 3>;
 
 // each(piece) for every piece of a triangle, depth first.
 template <class Each>
-void for_each_piece(const Corners& triangle, double longest, const Each& each) {
+void for_each_piece(const Corners& triangle, const Cut& cut, const Each& each) {
   std::vector<Corners> pending{triangle};
   while (!pending.empty()) {
     const Corners corners = pending.back();
@@ -35,12 +39,12 @@ void for_each_piece(const Corners& triangle, double longest, const Each& each) {
     double squared = 0;
     for (std::size_t e = 0; e < 3; ++e) {
       const double length = (corners[(e + 1) % 3] - corners[e]).squaredNorm();
-      if (length > (1 + kSameEdge) * squared) {
+      if (length > (1 + cut.same) * squared) {
         squared = length;
         edge = e;
       }
     }
-    if (!(squared > (1 + kSameEdge) * longest * longest)) {
+    if (!(squared > (1 + cut.same) * cut.longest * cut.longest)) {
       each(corners);
       continue;
     }
@@ -68,9 +72,12 @@ struct Share {
   Corners corners;
 };
 
-// Longest edge [m] of a piece of a polygon.
-double longest_edge(const Body& body, std::uint32_t polygon) {
-  return kLongestEdge * body.parts[body.surface.polygon_part(polygon)].lattice.spacing.minCoeff();
+// Of the pieces of a polygon. At centre placement a piece goes with one element, so its place counts.
+Cut cut_of(const Body& body, std::uint32_t polygon) {
+  constexpr double kSameEdge = 1e-9;
+  const Part& part = body.parts[body.surface.polygon_part(polygon)];
+  return {kLongestEdge * part.lattice.spacing.minCoeff(),
+          part.placement == Placement::centre ? kSameEdge : 0};
 }
 
 std::vector<Share> shares_of(const Body& body, const Triangles& triangles,
@@ -80,9 +87,9 @@ std::vector<Share> shares_of(const Body& body, const Triangles& triangles,
     const std::uint32_t polygon = triangles.polygon[t];
     Corners corners;
     for (std::size_t c = 0; c < 3; ++c) corners[c] = body.surface.vertices[triangles.corners[t][c]];
-    for_each_piece(corners, kThreadShare * longest_edge(body, polygon), [&](const Corners& piece) {
-      shares.push_back({polygon, piece});
-    });
+    Cut cut = cut_of(body, polygon);
+    cut.longest *= kThreadShare;
+    for_each_piece(corners, cut, [&](const Corners& piece) { shares.push_back({polygon, piece}); });
   }
   return shares;
 }
@@ -159,7 +166,7 @@ std::vector<std::size_t> begins_of(const Body& body, const std::vector<Share>& s
   parallel_for_each(
       shares.size(),
       [&](std::size_t s) {
-        for_each_piece(shares[s].corners, longest_edge(body, shares[s].polygon),
+        for_each_piece(shares[s].corners, cut_of(body, shares[s].polygon),
                        [&](const Corners&) { ++begin[s + 1]; });
       },
       16);
@@ -177,9 +184,9 @@ std::vector<SurfacePoint> points_of(const Problem& problem, const std::vector<Sh
       [&](std::size_t s) {
         std::size_t next = begin[s];
         SurfaceCarriers carriers(problem, shares[s].polygon);
-        for_each_piece(
-            shares[s].corners, longest_edge(problem.body, shares[s].polygon),
-            [&](const Corners& piece) { points[next++] = point_of(carriers, shares[s].polygon, piece); });
+        for_each_piece(shares[s].corners, cut_of(problem.body, shares[s].polygon), [&](const Corners& piece) {
+          points[next++] = point_of(carriers, shares[s].polygon, piece);
+        });
       },
       16);
   std::erase_if(points,
@@ -207,11 +214,10 @@ std::vector<SurfacePoint> gathered_surface_points(const Problem& problem,
       [&](std::size_t s) {
         Gathered sums;
         SurfaceCarriers carriers(problem, shares[s].polygon);
-        for_each_piece(shares[s].corners, longest_edge(problem.body, shares[s].polygon),
-                       [&](const Corners& piece) {
-                         const SurfacePoint point = point_of(carriers, shares[s].polygon, piece);
-                         sums.add(point, carriers.tied(point.position, point.area_vector));
-                       });
+        for_each_piece(shares[s].corners, cut_of(problem.body, shares[s].polygon), [&](const Corners& piece) {
+          const SurfacePoint point = point_of(carriers, shares[s].polygon, piece);
+          sums.add(point, carriers.tied(point.position, point.area_vector));
+        });
         gathered[s] = sums.take();
       },
       16);
