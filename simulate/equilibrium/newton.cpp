@@ -132,7 +132,7 @@ class Solver {
 
 void Solver::update_residual() {
   Forces forces = mechanics_.forces(state_);
-  sound_ = !full() || mechanics_.is_sound(state_, forces);
+  sound_ = !before_ || mechanics_.is_sound(state_, forces);
   residual_ = std::move(forces.total);
   clear_prescribed(mechanics_.constraints(), residual_);
   residual_norm_ = norm(residual_);
