@@ -132,7 +132,7 @@ class Solver {
 
 void Solver::update_residual() {
   Forces forces = mechanics_.forces(state_);
-  sound_ = !full() || mechanics_.is_sound(state_, forces);
+  sound_ = !before_ || mechanics_.is_sound(state_, forces);
   residual_ = std::move(forces.total);
   clear_prescribed(mechanics_.constraints(), residual_);
   residual_norm_ = norm(residual_);
@@ -397,8 +397,13 @@ bool Solver::advance() {
   parallel_for_each(rhs.size(), [&](std::size_t e) { predicted[e] = rhs[e] - predicted[e]; });
   const double before = led ? residual_norm_ : norm(rhs);
   if (!(full() ? full_step() : led ? line_search(residual_) : lead_prescribed())) return false;
+  const double reached = outcome_.relative_residual;
   update_residual();
-  if (!sound_) return false;
+  if (!sound_) {
+    state_ = std::move(*before_);
+    outcome_.relative_residual = reached;
+    return false;
+  }
   if (before > 0) {
     parallel_for_each(rhs.size(), [&](std::size_t e) { predicted[e] -= residual_[e]; });
     kept_.model_error = norm(predicted) / before;
