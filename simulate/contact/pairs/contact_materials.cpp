@@ -10,8 +10,8 @@ namespace flexel::simulate {
 namespace {
 
 constexpr double kStiffness = 3;  // of a contact, in E / h an area
-// Radius of the kernel, of a spacing: a little less than one, so that faces whose lattices lie on each other have no pairs
-// of neighbours with next to no weight.
+// Radius of the kernel, of a spacing: a little less than one, so that faces whose lattices lie on each other
+// have no pairs of neighbours with next to no weight.
 constexpr double kReach = 0.995;
 constexpr double kSoft = 0.01;         // of a spacing, over which pressure begins
 constexpr double kFarthestSoft = 0.4;  // of a spacing, that an impact makes it at most
