@@ -28,8 +28,8 @@ class ContactFriction {
 
   // Brings PairStates::rubbing() to `state`, for which the pairs have been evaluated.
   void update(const State& state);
-  // After a step of `drift` s that led to `state`, which the pairs have gone through. `active`: whether anything dissipates
-  // at all.
+  // After a step of `drift` s that led to `state`, which the pairs have gone through. `active`: whether
+  // anything dissipates at all.
   void finish_step(const State& state, double drift, bool active);
 
   // Of an active pair under pressure: from each of its points where they meet [m]; N/m, of the pair along its
@@ -42,7 +42,8 @@ class ContactFriction {
   void set_fresh(bool fresh) { fresh_ = fresh; }
 
  private:
-  // Of what may stick, one by one; with slips and adhesion brought up to date, where `drift` [s] is not negative.
+  // Of what may stick, one by one; with slips and adhesion brought up to date, where `drift` [s] is not
+  // negative.
   void hold(double drift, bool fresh);
   void take_velocities(const State& state);
   void forget_separated();

@@ -23,8 +23,8 @@ class ContactLoads {
   ContactLoads(const ContactSurface& surface, const std::vector<std::uint8_t>& parts);
 
   void clear();
-  // Of the acting pairs, along their normals or, `rubbing`, of friction and damping: to `forces` (elements x 3) N and to
-  // the resultants.
+  // Of the acting pairs, along their normals or, `rubbing`, of friction and damping: to `forces` (elements x
+  // 3) N and to the resultants.
   void add(const State& state, const PairList& list, const PairStates& states, bool rubbing,
            std::vector<Vec3>& forces);
 

@@ -1,5 +1,5 @@
-// The cells that carry the points of a list of pairs, and where the points are and go in a state. Elements are numbered as in
-// PairList::elements(), so that what a step reads of them lies together in memory; what points of one cell share
+// The cells that carry the points of a list of pairs, and where the points are and go in a state. Elements are
+// numbered as in PairList::elements(), so that what a step reads of them lies together in memory; what points of one cell share
 // is found once.
 #pragma once
 #include <utility>

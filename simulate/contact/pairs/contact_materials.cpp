@@ -9,10 +9,7 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kStiffness = 3;  // of a contact, in E / h an area
-// Radius of the kernel, of a spacing: a little less than one, so that faces whose lattices lie on each other have no pairs
-// of neighbours with next to no weight.
-constexpr double kReach = 0.995;
+constexpr double kStiffness = 3;       // of a contact, in E / h an area
 constexpr double kSoft = 0.01;         // of a spacing, over which pressure begins
 constexpr double kFarthestSoft = 0.4;  // of a spacing, that an impact makes it at most
 constexpr double kMostPullOff = 0.35;  // spacings, at most, of the extension at which adhesion ends
@@ -98,7 +95,7 @@ PairConstants ContactMaterials::constants(std::uint32_t i, std::uint32_t j) cons
   const bool balls = a.radius > 0 && b.radius > 0;
   PairConstants pair;
   pair.stiffness = foundation(i, j) * (balls ? 0.5 * (a.area + b.area) : a.area * b.area);
-  pair.width = balls ? 0 : kReach * std::max(a.width, b.width);
+  pair.width = balls ? 0 : std::max(a.width, b.width);
   pair.facing_from = std::min(a.facing_from, b.facing_from);
   pair.facing_fully = std::min(a.facing_fully, b.facing_fully);
   pair.limit = a.depth + b.depth;

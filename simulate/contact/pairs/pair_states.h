@@ -35,8 +35,9 @@ class PairStates {
     evaluated_builds_ = 0;  // the trial that was last evaluated counts from now on
   }
 
-  // Likewise after a step of `drift` s that led to `state`, which changes how softly pairs begin to press (the states are
-  // those that a run which goes on from here would find) and, if they rub, slips; with a damping of `damping` s.
+  // Likewise after a step of `drift` s that led to `state`, which changes how softly pairs begin to press (the
+  // states are those that a run which goes on from here would find) and, if they rub, slips; with a damping of
+  // `damping` s.
   void go_through(const State& state, double drift, bool rubs, double damping);
   // rubbing() in `state`, which is evaluated, by its velocities.
   void rub(const State& state, double damping);
@@ -118,7 +119,7 @@ class PairStates {
   std::vector<PairRubbing> rubbing_;               // likewise
   std::vector<std::uint32_t> active_, acting_;
   std::vector<std::uint32_t> acting_points_;
-  // Pairs that press stay so from step to step, mostly: acting_ of a list without others is evaluated by itself.
+  // Pairs that press stay so from step to step, mostly: without others, acting_ is evaluated by itself.
   bool others_act_ = false;                                // what may stick, or is released
   static constexpr std::uint8_t kActive = 1, kSteady = 2;  // kSteady: of those
   std::vector<std::uint8_t> is_active_;                    // (pairs)

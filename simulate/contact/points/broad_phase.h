@@ -31,8 +31,8 @@ class CubeOrder {
   [[nodiscard]] std::size_t size() const { return points_.size(); }
   [[nodiscard]] std::uint32_t point(std::size_t place) const { return points_[place]; }
 
-  // visit(a, b, c) for the places a of [begin, end) and those [b, c) of points in the 27 cubes around that of a, a row of
-  // cubes at a time; done(a) after them.
+  // visit(a, b, c) for the places a of [begin, end) and those [b, c) of points in the 27 cubes around that of
+  // a, a row of cubes at a time; done(a) after them.
   template <class Visit, class Done>
   void visit_near(std::size_t begin, std::size_t end, const Visit& visit, const Done& done) const;
 
