@@ -348,8 +348,10 @@ void CellStiffness::products_of_cells(const double* x, double* y) const {
 
 CellStiffness::Adding CellStiffness::adding() const {
   Adding result;
-  result.columns.reserve(added_.values.size());
-  result.values.reserve(added_.values.size());
+  const auto count = static_cast<std::size_t>(std::count_if(
+      added_.values.begin(), added_.values.end(), [](const Block& block) { return block != Block::Zero(); }));
+  result.columns.reserve(count);
+  result.values.reserve(count);
   for (std::uint32_t e = 0; e < body_.element_count(); ++e) {
     const std::size_t before = result.columns.size();
     for (std::uint64_t q = added_.row_offsets[e]; q < added_.row_offsets[e + 1]; ++q)

@@ -124,13 +124,14 @@ void CarriedMotion::give_back(const Problem& problem, const std::vector<std::uin
 // Angular momentum stays, so the energy of a spin goes by the inverse of the moment of inertia, as its speed does.
 void CarriedMotion::warn_of_spin(const Problem& problem, const State& state, const std::string& origin,
                                  Progress& progress) const {
-  constexpr double kNoticeable = 1e-3;  // of the energy
+  constexpr double kNoticeable = 1e-3;     // of the energy
+  constexpr double kLargestChange = 0.02;  // of the spin
   const std::vector<double> mass = lumped_masses(problem);
   for (std::size_t p = 0; p < spin_.size(); ++p) {
     if (!(spin_[p] > kNoticeable * (internal_ + kinetic_))) continue;
     const Part& part = problem.body.parts[p];
     const double change = spin_energy(problem.body, part, state, mass) / spin_[p] - 1;
-    if (!(std::abs(change) > kLargestEnergyChange)) continue;
+    if (!(std::abs(change) > kLargestChange)) continue;
     progress.warn(
         fmt::format("{}: part \"{}\" spins {:.2g} % {} on its new lattice, on which it has another moment of "
                     "inertia; its angular "

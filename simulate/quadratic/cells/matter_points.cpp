@@ -1,3 +1,4 @@
+// Integrals of element shape functions over the matter, node by node.
 #include "simulate/quadratic/cells/matter_points.h"
 
 #include <limits>
