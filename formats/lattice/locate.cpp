@@ -167,7 +167,9 @@ PointHomes::PointHomes(const Body& body, std::span<const std::uint8_t> left_out_
     : body_(body),
       left_out_cells_(left_out_cells),
       left_out_elements_(left_out_elements),
-      polygons_(body.surface) {
+      polygons_(body.surface),
+      at_surface_(body.cell_count()) {
+  for (const std::uint32_t cell : body.surface_cells) at_surface_[cell] = 1;
   for (const Part& part : body.parts) {
     const auto [begin, end] = owners_of(part);
     bool ascend = true;
@@ -291,7 +293,10 @@ std::uint32_t PointHomes::cell_of(const Part& part, const Nearest& nearest, cons
   });
   if (under)
     if (const auto cell = stand_in(part, nearest, *under)) return *cell;
-  if (cells.size() == 1) return cells.front();
+  // Of cells inside, as around a point on the lattice's planes, no polygon would be found among all.
+  if (cells.size() == 1 ||
+      std::none_of(cells.begin(), cells.end(), [&](std::uint32_t cell) { return at_surface_[cell] != 0; }))
+    return cells.front();
   // Two pieces of one voxel that a polygon bounds are not told apart by it.
   const auto distinct = [&](std::uint32_t polygon) -> std::optional<std::uint32_t> {
     std::optional<std::uint32_t> last;

@@ -90,7 +90,8 @@ class PointHomes {
   const Body& body_;
   std::span<const std::uint8_t> left_out_cells_, left_out_elements_;
   NearestPolygon polygons_;
-  std::vector<std::uint8_t> sorted_;  // (parts) 1: owners ascend by voxel, k first
+  std::vector<std::uint8_t> at_surface_;  // (cells) 1: polygons bound it
+  std::vector<std::uint8_t> sorted_;      // (parts) 1: owners ascend by voxel, k first
 };
 
 // Where the material point is now / was at rest.

@@ -91,6 +91,7 @@ class Balance {
   bool add_column(const Preconditioner& preconditioner, Eigen::Index j, Eigen::MatrixXd& slope);
   void correct(Eigen::MatrixXd& slope) const;
   void refuse_free(const Eigen::MatrixXd& slope) const;
+  bool balanced(const LinkVector& left);
   bool find();
 
   Mechanics& mechanics_;
@@ -99,9 +100,10 @@ class Balance {
   const NewtonProgress& progress_;
   std::vector<std::shared_ptr<RigidLink>> links_;
   NewtonOutcome outcome_;
-  double scale_ = 0;  // N: loads and reactions
-  double stiff_ = 0;  // N/m, mean of the tangent's diagonal
-  double gone_ = 0;   // share of the run's time
+  double scale_ = 0;    // N: loads and reactions
+  double stiff_ = 0;    // N/m, mean of the tangent's diagonal
+  double gone_ = 0;     // share of the run's time
+  LinkVector answers_;  // (unknowns) m/m, root of the mean square of the elements' answers
   // (unknowns) answers of the elements to a unit of each [m/m], and what their linear solutions left [N/m]
   std::vector<std::vector<Vec3>> response_, left_over_;
 };
@@ -213,6 +215,10 @@ bool Balance::take_slope(const Preconditioner& preconditioner, Eigen::MatrixXd& 
   bool good = true;
   for (Eigen::Index j = 0; good && j < unknowns(); ++j) good = add_column(preconditioner, j, slope);
   if (good) correct(slope);
+  answers_.setZero(unknowns());
+  for (std::size_t j = 0; j < response_.size(); ++j)
+    answers_[static_cast<Eigen::Index>(j)] =
+        std::sqrt(dot(response_[j], response_[j]) / static_cast<double>(response_[j].size()));
   response_.clear();
   left_over_.clear();
   return good;
@@ -266,6 +272,15 @@ NewtonOutcome Balance::settle(double from, double to) {
   });
 }
 
+// What the elements' forces are off by, as rounding leaves them, comes to the links by their answers: on a slender part,
+// whose end goes far where its link turns, that is more than the tolerance.
+bool Balance::balanced(const LinkVector& left) {
+  const double allowed = kLooser * options_.tolerance * scale_;
+  if (left.norm() <= allowed) return true;
+  const std::vector<Vec3> off = free_forces(state_);
+  return (left.cwiseAbs() - std::sqrt(dot(off, off)) * answers_).cwiseMax(0).norm() <= allowed;
+}
+
 // Moves the links until nothing is lacking. False when it did not get there.
 bool Balance::find() {
   // Where a step of the links makes the body touch something, its slope is another.
@@ -293,7 +308,7 @@ bool Balance::find() {
     outcome_.trouble = one.trouble;
     if (!one.converged) return false;
     const LinkVector now = lacking(state_);
-    if (now.norm() <= kLooser * options_.tolerance * scale_) return true;
+    if (balanced(now)) return true;
     outcome_.trouble =
         fmt::format("the rigid link \"{}\" lacks {:.1e} of its load", links_[0]->name, now.norm() / scale_);
     // The first step does not know yet what other loads, as weight, lay on the links.
