@@ -35,9 +35,9 @@ def coil(trial):
         sound_state(out)
         trial.show(out)
         ratio = books(out, 1e-2)
-        code, err = call("flexel-map", out.out, "-o", out.folder / "coil.stl")
+        code, err = call("flexel-map", out.out, "-o", out.folder / "mapped.stl")
         require(code == 0, f"not mapped: {err.strip()[-200:]}")
-        surface = any_stl_triangles(out.folder / "coil.stl") / 1e3
+        surface = any_stl_triangles(out.folder / "mapped.stl") / 1e3
         depth, near = deepest(surface, h), touching(surface, h, 0.1 * h)
         share = len(np.unique(np.floor(np.arctan2(near[:, 1], near[:, 0]) * (12 / np.pi)))) / 24
         trial.figure(f"touches over {significant(share)} of the round, deepest in itself {significant(depth)} h, smallest J {significant(out.summary['smallest_jacobian'])}, books {significant(ratio)}")
