@@ -268,10 +268,12 @@ std::optional<double> ImplicitEuler::begin(const State& state, double end, doubl
     if (share * step_ < shortest || look == kLooks) return std::nullopt;
     end = *state.time + share * step_;
   }
-  if (recouples && !covers_couples())
+  if (recouples && !covers_couples()) {
     make_mechanics();
-  else if (recouples)
+  } else if (recouples) {
     mechanics_->renew_effects_pattern();
+    memory_.factored = false;  // what effects had added is gone from the tangent
+  }
   if (std::abs(step_ - previous) > kSameStep * previous) forget();
   // Steps differ by rounding: what begins anew must not know of the earlier ones.
   if (!memory_.preconditioner || std::abs(step_ - inertia_of_) > kSameStep * inertia_of_) set_inertia();

@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <tuple>
 
 #include "base/error.h"
@@ -160,6 +161,31 @@ TEST(ImplicitContact, TheNormalTangentIsTheDerivativeOfTheForces) {
       EXPECT_NEAR(back, product(other, whole.image), 1e-10 * std::abs(back));
     }
   }
+}
+
+// Blocks that press, deeper from step to step, until a trial leads them through one another: no place to be, though no
+// pair presses any more.
+TEST(ImplicitContact, ATrialThatLeadsThroughWhatPressesHasNoEnergy) {
+  Body body = block("a", {2, 2, 2});
+  append(body, block("b", {2, 2, 2}, Vec3(0, 0, 1.9 * kSide)));
+  const Problem problem = problem_of(body);
+  Contacts contacts(all_parts(body), problem);
+  State at = starting_at_rest(body);
+  const auto begin_and_lower = [&] {
+    State aimed = at;
+    for (std::uint32_t e = body.parts[1].element_begin; e < body.parts[1].element_end; ++e)
+      aimed.displacement[e].z() -= 0.24 * kSide;
+    EXPECT_EQ(contacts.begin_implicit_step(at, aimed, 1e-3), 1);
+    const double before = contacts.energy(at);
+    EXPECT_TRUE(before > 0 && std::isfinite(before));
+    at = aimed;
+    return contacts.energy(at);
+  };
+  for (const double depth : {0.34, 0.58, 0.82}) {
+    EXPECT_TRUE(std::isfinite(begin_and_lower())) << depth;
+    contacts.end_implicit_step(at);
+  }
+  EXPECT_EQ(begin_and_lower(), std::numeric_limits<double>::infinity());
 }
 
 TEST(ImplicitContact, FreeFallAboveAPlaneIsExact) {

@@ -327,20 +327,23 @@ void PairStates::evaluate_batch(const Batch& batch, const contact_kernels::PairS
   }
 }
 
-// Active pairs are the steady ones and those that are awake and near.
+// Active pairs are the steady ones, also those of them that are near but have just ceased to press, and those that
+// are awake and near. Where all are evaluated, steady pairs are among those that are awake.
 void PairStates::choose_active(bool changed) {
   active_.clear();
   auto steady = acting_.cbegin();
   const auto end = others_act_ ? steady : acting_.cend();
+  const auto add_steady = [&] {
+    const std::uint8_t is = is_active_[*steady];
+    if (is == kSteady || (is == kActive && !evaluated_all_)) active_.push_back(*steady);
+  };
   for (const std::uint32_t p : schedule_.awake()) {
     if (is_active_[p] != kActive) continue;
-    for (; steady != end && *steady < p; ++steady)
-      if (is_active_[*steady] == kSteady) active_.push_back(*steady);
+    for (; steady != end && *steady < p; ++steady) add_steady();
     changed = changed || states_[p].pressure > 0;
     active_.push_back(p);
   }
-  for (; steady != end; ++steady)
-    if (is_active_[*steady] == kSteady) active_.push_back(*steady);
+  for (; steady != end; ++steady) add_steady();
   if (changed || others_act_) choose_acting();
 }
 
