@@ -1,3 +1,4 @@
+// Forces on elements are spread over the matter by the products of their trilinear shape functions and those of the nodes.
 #include "simulate/quadratic/cells/matter_points.h"
 
 #include <limits>
