@@ -122,13 +122,14 @@ void CarriedMotion::give_back(const Problem& problem, const std::vector<std::uin
 }
 
 // Angular momentum stays, so the energy of a spin goes by the inverse of the moment of inertia, as its speed does.
-void CarriedMotion::warn_of_spin(const Problem& problem, const State& state, const std::string& origin,
+void CarriedMotion::warn_of_spin(const Problem& problem, const State& state,
+                                 const std::vector<std::uint8_t>& held_parts, const std::string& origin,
                                  Progress& progress) const {
   constexpr double kNoticeable = 1e-3;     // of the energy
   constexpr double kLargestChange = 0.02;  // of the spin
   const std::vector<double> mass = lumped_masses(problem);
   for (std::size_t p = 0; p < spin_.size(); ++p) {
-    if (!(spin_[p] > kNoticeable * (internal_ + kinetic_))) continue;
+    if (held_parts[p] != 0 || !(spin_[p] > kNoticeable * (internal_ + kinetic_))) continue;
     const Part& part = problem.body.parts[p];
     const double change = spin_energy(problem.body, part, state, mass) / spin_[p] - 1;
     if (!(std::abs(change) > kLargestChange)) continue;
@@ -149,7 +150,6 @@ std::string CarriedMotion::change_of_energy(const Problem& problem, const State&
         fmt::format("{}: on the new lattice a cell is folded: change the resolution where the "
                     "body is deformed less",
                     origin));
-  warn_of_spin(problem, state, origin, progress);
   if (!(internal_ > kKineticRounding * kinetic_)) return "";
   const double change = now / internal_ - 1;
   if (std::abs(change) > borne)

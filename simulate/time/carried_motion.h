@@ -29,17 +29,17 @@ class CarriedMotion {
   // axes along which supports lead them; empty: none.
   void give_back(const Problem& problem, const std::vector<std::uint8_t>& held, State& state) const;
   // Then: the change of the energy in words, of what is elastic or `stored` in contacts, and of the motion of
-  // matter against its mean; "" where there is none of it. Warns where it is more than `borne`, a share, and where a part
-  // spins otherwise, as its moment of inertia is another one on the new lattice; `origin`: of the event. Throws
-  // DivergedError: a cell is folded.
+  // matter against its mean; "" where there is none of it. Warns where it is more than `borne`, a share;
+  // `origin`: of the event. Throws DivergedError: a cell is folded.
   [[nodiscard]] std::string change_of_energy(const Problem& problem, const State& state, double stored,
                                              double borne, const std::string& origin,
                                              Progress& progress) const;
+  // Warns of a part that spins otherwise, as its moment of inertia is another one on the new lattice. `held_parts`: 1: supports
+  // hold some of it, which give and take angular momentum anyway.
+  void warn_of_spin(const Problem& problem, const State& state, const std::vector<std::uint8_t>& held_parts,
+                    const std::string& origin, Progress& progress) const;
 
  private:
-  void warn_of_spin(const Problem& problem, const State& state, const std::string& origin,
-                    Progress& progress) const;
-
   std::vector<PartMomenta> momenta_;   // (parts)
   std::vector<double> spin_;           // (parts) J, of their turning as rigid bodies
   double internal_ = 0, kinetic_ = 0;  // J

@@ -22,6 +22,7 @@
 #include "formats/lattice/fused_points.h"
 #include "simulate/contact/pairs/stuck_places.h"
 #include "simulate/effects/contact.h"
+#include "simulate/effects/supports.h"
 #include "simulate/events/adaptive_resolution.h"
 #include "simulate/events/edit.h"
 #include "simulate/events/joined_bonds.h"
@@ -53,6 +54,19 @@ constexpr int kLook = 25, kTouchLook = 5;
 constexpr std::size_t kRows = 1000;  // of the history, unless the scene says otherwise
 constexpr std::size_t kFrames = 50;  // likewise
 constexpr double kSameTime = 1e-12;  // share of a time
+
+// (parts) 1: a [[fix]] or a [[move]] has some of it.
+std::vector<std::uint8_t> held_parts(const Scene& scene, const Body& body) {
+  std::vector<std::uint8_t> held(body.parts.size());
+  const std::vector<std::uint32_t> part = element_parts(body);
+  const EffectParameters present = without_coming_parts(scene, body);
+  for (const Tie& tie : present.get<Supports>().ties) {
+    const Selected selected = resolve(tie.where, body);
+    for (const std::uint32_t e : selected.elements) held[part[e]] = 1;
+    for (const std::uint32_t p : selected.polygons) held[body.surface.polygon_part(p)] = 1;
+  }
+  return held;
+}
 
 class TimedRun {
  public:
@@ -470,6 +484,7 @@ void TimedRun::keep_motion(const CarriedMotion& carried, const Event& event,
   const std::string what = carried.change_of_energy(
       problem, segment_->state(), stored, adaptive_ ? adaptive_->energy_borne() : kLargestEnergyChange,
       event.origin, progress_);
+  carried.warn_of_spin(problem, segment_->state(), held_parts(scene_, body_), event.origin, progress_);
   if (!what.empty()) progress_.say(fmt::format("at {:.4g} s {}", event.at, what));
 }
 
