@@ -125,14 +125,13 @@ void CarriedMotion::give_back(const Problem& problem, const std::vector<std::uin
 void CarriedMotion::warn_of_spin(const Problem& problem, const State& state,
                                  const std::vector<std::uint8_t>& held_parts, const std::string& origin,
                                  Progress& progress) const {
-  constexpr double kNoticeable = 1e-3;     // of the energy
-  constexpr double kLargestChange = 0.02;  // of the spin
+  constexpr double kNoticeable = 1e-3;  // of the energy
   const std::vector<double> mass = lumped_masses(problem);
   for (std::size_t p = 0; p < spin_.size(); ++p) {
     if (held_parts[p] != 0 || !(spin_[p] > kNoticeable * (internal_ + kinetic_))) continue;
     const Part& part = problem.body.parts[p];
     const double change = spin_energy(problem.body, part, state, mass) / spin_[p] - 1;
-    if (!(std::abs(change) > kLargestChange)) continue;
+    if (!(std::abs(change) > kLargestEnergyChange)) continue;
     progress.warn(
         fmt::format("{}: part \"{}\" spins {:.2g} % {} on its new lattice, on which it has another moment of "
                     "inertia; its angular "
