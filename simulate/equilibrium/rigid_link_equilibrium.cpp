@@ -91,7 +91,7 @@ class Balance {
   bool add_column(const Preconditioner& preconditioner, Eigen::Index j, Eigen::MatrixXd& slope);
   void correct(Eigen::MatrixXd& slope) const;
   void refuse_free(const Eigen::MatrixXd& slope) const;
-  bool balanced(const LinkVector& left);
+  bool is_rounding(const LinkVector& left);
   bool find();
 
   Mechanics& mechanics_;
@@ -274,11 +274,10 @@ NewtonOutcome Balance::settle(double from, double to) {
 
 // What the elements' forces are off by, as rounding leaves them, comes to the links by their answers: on a slender part,
 // whose end goes far where its link turns, that is more than the tolerance.
-bool Balance::balanced(const LinkVector& left) {
-  const double allowed = kLooser * options_.tolerance * scale_;
-  if (left.norm() <= allowed) return true;
+bool Balance::is_rounding(const LinkVector& left) {
   const std::vector<Vec3> off = free_forces(state_);
-  return (left.cwiseAbs() - std::sqrt(dot(off, off)) * answers_).cwiseMax(0).norm() <= allowed;
+  return (left.cwiseAbs() - std::sqrt(dot(off, off)) * answers_).cwiseMax(0).norm() <=
+         kLooser * options_.tolerance * scale_;
 }
 
 // Moves the links until nothing is lacking. False when it did not get there.
@@ -308,12 +307,12 @@ bool Balance::find() {
     outcome_.trouble = one.trouble;
     if (!one.converged) return false;
     const LinkVector now = lacking(state_);
-    if (balanced(now)) return true;
+    serves = now.norm() < kServes * left.norm();
+    if (now.norm() <= kLooser * options_.tolerance * scale_ || (!serves && is_rounding(now))) return true;
     outcome_.trouble =
         fmt::format("the rigid link \"{}\" lacks {:.1e} of its load", links_[0]->name, now.norm() / scale_);
     // The first step does not know yet what other loads, as weight, lay on the links.
     if (!touches && k > 0 && !(now.norm() < kAstray * left.norm())) return false;
-    serves = now.norm() < kServes * left.norm();
     slope += (now - left - slope * step) * step.transpose() / step.squaredNorm();
     left = now;
   }
