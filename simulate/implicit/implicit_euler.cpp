@@ -18,8 +18,7 @@ constexpr double kShortest = 1.0 / 1024;  // of a step
 constexpr int kFullIterations = 12;
 // Elements: contact changes the tangent in every iteration, and a factorisation is dearer than a hierarchy.
 constexpr std::size_t kDirectRowsTouching = 100;
-// Of a step of Newton's method, relative, under which the cells' tangent serves
-// for the next one: what contact does changes more.
+// Error of the linear model over a step of Newton's method, relative, under which the cells' tangent serves for the next one.
 constexpr double kKeepCellsBelow = 0.1;
 constexpr int kPasses = 12;            // of Newton's method, until what is held fixed in it suits
 constexpr int kLooks = 40;             // at a step, each at a shorter one, until effects bear it

@@ -7,16 +7,31 @@
 namespace flexel::simulate {
 namespace {
 
+// Of a cell's nodes and of its elements, at the points whose weights the moments are: the same in every cell.
+struct ShapesAtPoints {
+  std::array<std::array<double, kQuadraticNodes>, kMoments> node{};
+  std::array<std::array<double, 8>, kMoments> element{};
+};
+
+ShapesAtPoints shapes_at_points() {
+  ShapesAtPoints made;
+  for (std::size_t k = 0; k < kMoments; ++k) {
+    made.node[k] = quadratic_shape(gauss_point(k)).value;
+    for (std::size_t a = 0; a < 8; ++a)
+      for (std::size_t n = 0; n < kQuadraticNodes; ++n)
+        made.element[k][a] += trilinear_weight(n, a) * made.node[k][n];
+  }
+  return made;
+}
+
 // m^3: integrals of the shape functions of a cell's nodes times that of its element `corner`, over its matter.
 std::array<double, kQuadraticNodes> weighted_integrals(std::size_t corner, double voxel,
                                                        const Moments& moments) {
+  static const ShapesAtPoints shapes = shapes_at_points();
   std::array<double, kQuadraticNodes> sum{};
   for (std::size_t k = 0; k < kMoments; ++k) {
-    const QuadraticShape shape = quadratic_shape(gauss_point(k));
-    double weight = 0;
-    for (std::size_t n = 0; n < kQuadraticNodes; ++n) weight += trilinear_weight(n, corner) * shape.value[n];
-    weight *= voxel * moments[static_cast<Eigen::Index>(k)];
-    for (std::size_t n = 0; n < kQuadraticNodes; ++n) sum[n] += weight * shape.value[n];
+    const double weight = shapes.element[k][corner] * voxel * moments[static_cast<Eigen::Index>(k)];
+    for (std::size_t n = 0; n < kQuadraticNodes; ++n) sum[n] += weight * shapes.node[k][n];
   }
   return sum;
 }
