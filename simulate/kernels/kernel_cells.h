@@ -39,6 +39,41 @@ FLEXEL_INLINE void transform_back(const Modes& t, int c, Corners& f) {
   }
 }
 
+// s = K p of the modes xy, yz, zx, N/m times what p is.
+FLEXEL_INLINE void forces_by_mode(const CellConstants& k, const Lanes p[3][3], Lanes s[3][3]) {
+  for (int m = 0; m < 3; ++m)
+    s[m][(m + 2) % 3] = k.twisting[m][0] * p[0][2] + k.twisting[m][1] * p[1][0] + k.twisting[m][2] * p[2][1];
+  for (int j = 0; j < 3; ++j) {
+    const int a = (j + 1) % 3, b = (j + 2) % 3;
+    s[j][a] = k.bending[j][0] * p[j][a] + k.bending[j][1] * p[b][b];
+    s[b][b] = k.bending[j][1] * p[j][a] + k.bending[j][2] * p[b][b];
+  }
+}
+
+// Adds the stress of the hourglass energy [Pa]; sets the forces dU/dq_m [N]. With C = cof F: p = C^T q / J.
+FLEXEL_INLINE void add_hourglass(const Gradient& g, const Modes u[3], const CellConstants& k, Matrix& stress,
+                                 Lanes mode_force[4][3]) {
+  Lanes p[3][3], s[3][3];
+  for (int m = 0; m < 3; ++m)
+    for (int j = 0; j < 3; ++j)
+      p[m][j] =
+          g.cofactor.at[0][j] * u[0].q[m] + g.cofactor.at[1][j] * u[1].q[m] + g.cofactor.at[2][j] * u[2].q[m];
+  forces_by_mode(k, p, s);
+  const Lanes scale = 0.125 * g.inverse * g.inverse;
+  const Lanes share = (-0.125 / k.volume) * g.inverse;
+  for (int m = 0; m < 3; ++m) {
+    for (int j = 0; j < 3; ++j) s[m][j] *= scale;
+    for (int i = 0; i < 3; ++i) {
+      const Lanes r =
+          g.cofactor.at[i][0] * s[m][0] + g.cofactor.at[i][1] * s[m][1] + g.cofactor.at[i][2] * s[m][2];
+      mode_force[m][i] = (0.125 * k.hourglass[m]) * u[i].q[m] + r;
+      const Lanes shared = share * r;
+      for (int j = 0; j < 3; ++j) stress.at[i][j] += shared * p[m][j];
+    }
+  }
+  for (int i = 0; i < 3; ++i) mode_force[3][i] = (0.125 * k.hourglass[3]) * u[i].q[3];
+}
+
 FLEXEL_INLINE Gradient gradient_of(const Modes modes[3], const CellConstants& k, const Lanes& fill,
                                    Sums& sums) {
   Matrix h;
@@ -78,9 +113,42 @@ FLEXEL_INLINE void add_swelling(const Gradient& g, const Matrix& rate, const Cel
     for (int j = 0; j < 3; ++j) stress.at[i][j] += pressure * g.cofactor.at[i][j];
 }
 
-// Adds the viscous stress [Pa] to `stress`; sets `spin_free`, the forces of the hourglass modes [N].
+// Adds the viscous stress of the hourglass rates [Pa]; sets their forces [N].
+FLEXEL_INLINE void add_hourglass_damping(const Gradient& g, const Modes u[3], const Modes v[3],
+                                         const Matrix& rate, const CellConstants& k, Matrix& stress,
+                                         Lanes mode_force[4][3]) {
+  const Lanes eighth = 0.125 * g.inverse;
+  Lanes p[4][3], moved[4][3], drawn[3][3], s[3][3];
+  for (int m = 0; m < 4; ++m) {
+    for (int j = 0; j < 3; ++j)
+      p[m][j] = eighth * (g.cofactor.at[0][j] * u[0].q[m] + g.cofactor.at[1][j] * u[1].q[m] +
+                          g.cofactor.at[2][j] * u[2].q[m]);
+    for (int i = 0; i < 3; ++i)
+      moved[m][i] =
+          0.125 * v[i].q[m] - (rate.at[i][0] * p[m][0] + rate.at[i][1] * p[m][1] + rate.at[i][2] * p[m][2]);
+  }
+  for (int m = 0; m < 3; ++m)
+    for (int j = 0; j < 3; ++j)
+      drawn[m][j] = g.cofactor.at[0][j] * moved[m][0] + g.cofactor.at[1][j] * moved[m][1] +
+                    g.cofactor.at[2][j] * moved[m][2];
+  forces_by_mode(k, drawn, s);
+  const Lanes scale = k.damping * g.inverse * g.inverse;
+  const double per_volume = 1 / k.volume;
+  for (int m = 0; m < 4; ++m)
+    for (int i = 0; i < 3; ++i) {
+      Lanes force = (k.damping * k.hourglass[m]) * moved[m][i];
+      if (m < 3)
+        force += scale * (g.cofactor.at[i][0] * s[m][0] + g.cofactor.at[i][1] * s[m][1] +
+                          g.cofactor.at[i][2] * s[m][2]);
+      mode_force[m][i] = force;
+      const Lanes shared = per_volume * force;
+      for (int j = 0; j < 3; ++j) stress.at[i][j] -= shared * p[m][j];
+    }
+}
+
+// Adds the viscous stress [Pa] to `stress`; sets the viscous forces of the hourglass modes [N].
 FLEXEL_INLINE void add_damping(const Gradient& g, const Modes u[3], const Modes v[3], const CellConstants& k,
-                               Matrix& stress, Lanes spin_free[4][3]) {
+                               Matrix& stress, Lanes mode_force[4][3]) {
   Matrix rate;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) rate.at[i][j] = v[i].d[j] * (0.25 / k.spacing[j]);
@@ -104,35 +172,7 @@ FLEXEL_INLINE void add_damping(const Gradient& g, const Modes u[3], const Modes 
     for (int j = 0; j < 3; ++j)
       stress.at[i][j] +=
           s.at[i][j] + (g.h.at[i][0] * s.at[0][j] + g.h.at[i][1] * s.at[1][j] + g.h.at[i][2] * s.at[2][j]);
-  // spin w of L = dF/dt F^-1, F^-1 = (cof F)^T / J
-  Matrix l;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      l.at[i][j] = g.inverse * (rate.at[i][0] * g.cofactor.at[j][0] + rate.at[i][1] * g.cofactor.at[j][1] +
-                                rate.at[i][2] * g.cofactor.at[j][2]);
-  const Lanes w[3] = {0.5 * (l.at[2][1] - l.at[1][2]), 0.5 * (l.at[0][2] - l.at[2][0]),
-                      0.5 * (l.at[1][0] - l.at[0][1])};
-  Lanes torque[3] = {};  // sum_m tau c_m q_m x q'_m
-  for (int m = 0; m < 4; ++m) {
-    const Lanes q[3] = {0.125 * u[0].q[m], 0.125 * u[1].q[m], 0.125 * u[2].q[m]};
-    const double viscosity = k.damping * k.hourglass[m];
-    for (int i = 0; i < 3; ++i) {
-      const int a = (i + 1) % 3, b = (i + 2) % 3;
-      spin_free[m][i] = viscosity * (0.125 * v[i].q[m] - (w[a] * q[b] - w[b] * q[a]));
-    }
-    for (int i = 0; i < 3; ++i) {
-      const int a = (i + 1) % 3, b = (i + 2) % 3;
-      torque[i] += q[a] * spin_free[m][b] - q[b] * spin_free[m][a];
-    }
-  }
-  // its reaction through w: P += G F^-T / V, G_ij = 1/2 eps_kij t_k
-  const Lanes share = (0.5 / k.volume) * g.inverse;
-  for (int j = 0; j < 3; ++j) {
-    const Lanes x = g.cofactor.at[0][j], y = g.cofactor.at[1][j], z = g.cofactor.at[2][j];
-    stress.at[0][j] += share * (torque[2] * y - torque[1] * z);
-    stress.at[1][j] += share * (torque[0] * z - torque[2] * x);
-    stress.at[2][j] += share * (torque[1] * x - torque[0] * y);
-  }
+  add_hourglass_damping(g, u, v, rate, k, stress, mode_force);
 }
 
 FLEXEL_INLINE void forces_of(const Matrix& stress, const Lanes mode_force[4][3], const Lanes& fill,
