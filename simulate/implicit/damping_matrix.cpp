@@ -30,12 +30,15 @@ double rate_weight(const CellKind& kind, std::size_t mode, const Vec3& arm, std:
 void add_hourglass(const CellKind& kind, const CellVectors& u, const Mat3& turned, std::size_t a,
                    std::array<Mat3, 8>& row) {
   const HourglassTangent tangent = hourglass_tangent(kind, u, true);
-  add_hourglass_row(kind, tangent, 1, a, 0, 8, row.data());
+  std::array<Block, 8> own;
+  own.fill(Block::Zero());
+  add_hourglass_row(kind, tangent, 1, a, 0, 8, own.data());
+  for (std::size_t b = 0; b < 8; ++b) row[b] += own[b];
   const std::array<Vec3, 4> q = hourglass_displacements(kind, u);
   for (std::size_t mode = 0; mode < 4; ++mode) {
     const Vec3 arm = turned.transpose() * q[mode];
-    const double own = kind.hourglass[mode] * rate_weight(kind, mode, arm, a);
-    for (std::size_t b = 0; b < 8; ++b) row[b].diagonal().array() += own * rate_weight(kind, mode, arm, b);
+    const double scale = kind.hourglass[mode] * rate_weight(kind, mode, arm, a);
+    for (std::size_t b = 0; b < 8; ++b) row[b].diagonal().array() += scale * rate_weight(kind, mode, arm, b);
   }
 }
 

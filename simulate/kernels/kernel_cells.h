@@ -39,7 +39,7 @@ FLEXEL_INLINE void transform_back(const Modes& t, int c, Corners& f) {
   }
 }
 
-// s = K p of the modes xy, yz, zx, N/m times what p is.
+// s = K p of the modes xy, yz, zx. Of sums Q, K and c_m are per volume: forces dW/dQ [Pa/m].
 FLEXEL_INLINE void forces_by_mode(const CellConstants& k, const Lanes p[3][3], Lanes s[3][3]) {
   for (int m = 0; m < 3; ++m)
     s[m][(m + 2) % 3] = k.twisting[m][0] * p[0][2] + k.twisting[m][1] * p[1][0] + k.twisting[m][2] * p[2][1];
@@ -50,28 +50,46 @@ FLEXEL_INLINE void forces_by_mode(const CellConstants& k, const Lanes p[3][3], L
   }
 }
 
-// Adds the stress of the hourglass energy [Pa]; sets the forces dU/dq_m [N]. With C = cof F: p = C^T q / J.
-FLEXEL_INLINE void add_hourglass(const Gradient& g, const Modes u[3], const CellConstants& k, Matrix& stress,
+// M v, M^T v
+FLEXEL_INLINE void multiply(const Matrix& m, const Lanes v[3], Lanes to[3]) {
+  for (int i = 0; i < 3; ++i) to[i] = m.at[i][0] * v[0] + m.at[i][1] * v[1] + m.at[i][2] * v[2];
+}
+FLEXEL_INLINE void multiply_transposed(const Matrix& m, const Lanes v[3], Lanes to[3]) {
+  for (int i = 0; i < 3; ++i) to[i] = m.at[0][i] * v[0] + m.at[1][i] * v[1] + m.at[2][i] * v[2];
+}
+
+// F^-T, and the sums Q drawn back, p_m = F^-1 Q_m [m].
+struct Drawn {
+  Matrix inverse_transpose;
+  Lanes p[4][3];
+};
+
+template <int modes>
+FLEXEL_INLINE Drawn drawn_back(const Gradient& g, const Modes u[3]) {
+  Drawn drawn;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) drawn.inverse_transpose.at[i][j] = g.inverse * g.cofactor.at[i][j];
+  for (int m = 0; m < modes; ++m) {
+    const Lanes q[3] = {u[0].q[m], u[1].q[m], u[2].q[m]};
+    multiply_transposed(drawn.inverse_transpose, q, drawn.p[m]);
+  }
+  return drawn;
+}
+
+// Adds the stress of the hourglass energy [Pa]; sets the forces of its modes [Pa/m].
+FLEXEL_INLINE void add_hourglass(const Drawn& drawn, const Modes u[3], const CellConstants& k, Matrix& stress,
                                  Lanes mode_force[4][3]) {
-  Lanes p[3][3], s[3][3];
-  for (int m = 0; m < 3; ++m)
-    for (int j = 0; j < 3; ++j)
-      p[m][j] =
-          g.cofactor.at[0][j] * u[0].q[m] + g.cofactor.at[1][j] * u[1].q[m] + g.cofactor.at[2][j] * u[2].q[m];
-  forces_by_mode(k, p, s);
-  const Lanes scale = 0.125 * g.inverse * g.inverse;
-  const Lanes share = (-0.125 / k.volume) * g.inverse;
+  Lanes s[3][3];
+  forces_by_mode(k, drawn.p, s);
   for (int m = 0; m < 3; ++m) {
-    for (int j = 0; j < 3; ++j) s[m][j] *= scale;
+    Lanes r[3];
+    multiply(drawn.inverse_transpose, s[m], r);
     for (int i = 0; i < 3; ++i) {
-      const Lanes r =
-          g.cofactor.at[i][0] * s[m][0] + g.cofactor.at[i][1] * s[m][1] + g.cofactor.at[i][2] * s[m][2];
-      mode_force[m][i] = (0.125 * k.hourglass[m]) * u[i].q[m] + r;
-      const Lanes shared = share * r;
-      for (int j = 0; j < 3; ++j) stress.at[i][j] += shared * p[m][j];
+      mode_force[m][i] = k.hourglass[m] * u[i].q[m] + r[i];
+      for (int j = 0; j < 3; ++j) stress.at[i][j] -= r[i] * drawn.p[m][j];
     }
   }
-  for (int i = 0; i < 3; ++i) mode_force[3][i] = (0.125 * k.hourglass[3]) * u[i].q[3];
+  for (int i = 0; i < 3; ++i) mode_force[3][i] = k.hourglass[3] * u[i].q[3];
 }
 
 FLEXEL_INLINE Gradient gradient_of(const Modes modes[3], const CellConstants& k, const Lanes& fill,
@@ -113,42 +131,30 @@ FLEXEL_INLINE void add_swelling(const Gradient& g, const Matrix& rate, const Cel
     for (int j = 0; j < 3; ++j) stress.at[i][j] += pressure * g.cofactor.at[i][j];
 }
 
-// Adds the viscous stress of the hourglass rates [Pa]; sets their forces [N].
-FLEXEL_INLINE void add_hourglass_damping(const Gradient& g, const Modes u[3], const Modes v[3],
-                                         const Matrix& rate, const CellConstants& k, Matrix& stress,
-                                         Lanes mode_force[4][3]) {
-  const Lanes eighth = 0.125 * g.inverse;
-  Lanes p[4][3], moved[4][3], drawn[3][3], s[3][3];
+// Adds the viscous stress of the hourglass rates [Pa]; sets the forces of their modes [Pa/m]. `rate`: dF/dt.
+FLEXEL_INLINE void add_hourglass_damping(const Drawn& drawn, const Modes v[3], const Matrix& rate,
+                                         const CellConstants& k, Matrix& stress, Lanes mode_force[4][3]) {
+  Lanes moved[4][3], changed[3][3], s[3][3];  // q', dp/dt
   for (int m = 0; m < 4; ++m) {
-    for (int j = 0; j < 3; ++j)
-      p[m][j] = eighth * (g.cofactor.at[0][j] * u[0].q[m] + g.cofactor.at[1][j] * u[1].q[m] +
-                          g.cofactor.at[2][j] * u[2].q[m]);
-    for (int i = 0; i < 3; ++i)
-      moved[m][i] =
-          0.125 * v[i].q[m] - (rate.at[i][0] * p[m][0] + rate.at[i][1] * p[m][1] + rate.at[i][2] * p[m][2]);
+    multiply(rate, drawn.p[m], moved[m]);
+    for (int i = 0; i < 3; ++i) moved[m][i] = v[i].q[m] - moved[m][i];
+    if (m < 3) multiply_transposed(drawn.inverse_transpose, moved[m], changed[m]);
   }
-  for (int m = 0; m < 3; ++m)
-    for (int j = 0; j < 3; ++j)
-      drawn[m][j] = g.cofactor.at[0][j] * moved[m][0] + g.cofactor.at[1][j] * moved[m][1] +
-                    g.cofactor.at[2][j] * moved[m][2];
-  forces_by_mode(k, drawn, s);
-  const Lanes scale = k.damping * g.inverse * g.inverse;
-  const double per_volume = 1 / k.volume;
-  for (int m = 0; m < 4; ++m)
+  forces_by_mode(k, changed, s);
+  for (int m = 0; m < 4; ++m) {
+    Lanes r[3] = {};
+    if (m < 3) multiply(drawn.inverse_transpose, s[m], r);
     for (int i = 0; i < 3; ++i) {
-      Lanes force = (k.damping * k.hourglass[m]) * moved[m][i];
-      if (m < 3)
-        force += scale * (g.cofactor.at[i][0] * s[m][0] + g.cofactor.at[i][1] * s[m][1] +
-                          g.cofactor.at[i][2] * s[m][2]);
+      const Lanes force = k.damping * (k.hourglass[m] * moved[m][i] + r[i]);
       mode_force[m][i] = force;
-      const Lanes shared = per_volume * force;
-      for (int j = 0; j < 3; ++j) stress.at[i][j] -= shared * p[m][j];
+      for (int j = 0; j < 3; ++j) stress.at[i][j] -= force * drawn.p[m][j];
     }
+  }
 }
 
-// Adds the viscous stress [Pa] to `stress`; sets the viscous forces of the hourglass modes [N].
-FLEXEL_INLINE void add_damping(const Gradient& g, const Modes u[3], const Modes v[3], const CellConstants& k,
-                               Matrix& stress, Lanes mode_force[4][3]) {
+// Adds the viscous stress [Pa] to `stress`; sets the viscous forces of the hourglass modes [Pa/m].
+FLEXEL_INLINE void add_damping(const Gradient& g, const Drawn& drawn, const Modes v[3],
+                               const CellConstants& k, Matrix& stress, Lanes mode_force[4][3]) {
   Matrix rate;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) rate.at[i][j] = v[i].d[j] * (0.25 / k.spacing[j]);
@@ -172,15 +178,18 @@ FLEXEL_INLINE void add_damping(const Gradient& g, const Modes u[3], const Modes 
     for (int j = 0; j < 3; ++j)
       stress.at[i][j] +=
           s.at[i][j] + (g.h.at[i][0] * s.at[0][j] + g.h.at[i][1] * s.at[1][j] + g.h.at[i][2] * s.at[2][j]);
-  add_hourglass_damping(g, u, v, rate, k, stress, mode_force);
+  add_hourglass_damping(drawn, v, rate, k, stress, mode_force);
 }
 
 FLEXEL_INLINE void forces_of(const Matrix& stress, const Lanes mode_force[4][3], const Lanes& fill,
                              const CellConstants& k, Corners& force) {
+  Lanes along[3];
+  for (int j = 0; j < 3; ++j) along[j] = (-0.25 * k.volume / k.spacing[j]) * fill;
+  const Lanes whole = -k.volume * fill;
   for (int i = 0; i < 3; ++i) {
     Modes t;
-    for (int j = 0; j < 3; ++j) t.d[j] = -fill * stress.at[i][j] * (0.25 * k.volume / k.spacing[j]);
-    for (int m = 0; m < 4; ++m) t.q[m] = -fill * mode_force[m][i] * 0.125;
+    for (int j = 0; j < 3; ++j) t.d[j] = along[j] * stress.at[i][j];
+    for (int m = 0; m < 4; ++m) t.q[m] = whole * mode_force[m][i];
     transform_back(t, i, force);
   }
 }

@@ -13,7 +13,7 @@
 // to one of the voxel.
 //
 // The hourglass displacements q_m have a plastic part F Q_m, which turns with the cell: energy U_h of e_m = q_m - F Q_m
-// and p_m = F^-1 e_m. Their stress at a cell's faces, beside the mean one, S^2 = 12 mu / V U_h, is bounded as the bending
+// and p_m = F^-1 e_m. Their stress at a cell's faces, beside the mean one, S^2 = 12 mu U_h / V, is bounded as the bending
 // moment of a rectangular section under tension is (Prager and Hodge 1951,
 // M / Mp = 1 - (N / Np)^2, Mp = 3/2 My), but not below 1/20 of the yield stress, which keeps cells that yield
 // from swinging in these modes:
@@ -83,9 +83,9 @@ struct Elastic {
   Lanes trace;       // tr(b - I)
   Lanes change;      // J - 1, J over that of the rest shape
   Lanes log_volume;  // ln J
-  // With plasticity: e_m [m], p_m of the first three [m], dU/dq_m [N] and of it the part by K.
+  // With plasticity, of sums: 8 e_m [m], p_m of the first three [m], their forces [Pa/m] and of these the part by K.
   Lanes hourglass[4][3], drawn[3][3], mode_force[4][3], by_mode[3][3];
-  Lanes hourglass_square;  // 2 U_h [J]
+  Lanes hourglass_square;  // 2 U_h / V [Pa]
 };
 
 FLEXEL_INLINE Symmetric deviator(const Symmetric& s, const Lanes& trace) {
@@ -94,12 +94,12 @@ FLEXEL_INLINE Symmetric deviator(const Symmetric& s, const Lanes& trace) {
   return d;
 }
 
-// 2 U_h, which is of second order.
+// 2 U_h / V, which is of second order.
 FLEXEL_INLINE Lanes hourglass_square(const Modes u[3], const Lanes mode_force[4][3]) {
   Lanes sum = {};
   for (int m = 0; m < 4; ++m)
     for (int i = 0; i < 3; ++i) sum += u[i].q[m] * mode_force[m][i];
-  return 0.125 * sum;
+  return sum;
 }
 
 // Without the hourglass displacements.
@@ -130,27 +130,24 @@ FLEXEL_INLINE void set_hourglass(const Gradient& g, const Modes u[3], const Cell
                                  const PlasticBlock& memory, Elastic& now) {
   const Matrix f = deformation(g), back = inverse_of(g);
   for (int m = 0; m < 4; ++m) {
-    const Lanes q[3] = {load(memory.hourglass[m][0]), load(memory.hourglass[m][1]),
-                        load(memory.hourglass[m][2])};
-    for (int i = 0; i < 3; ++i)
-      now.hourglass[m][i] = 0.125 * u[i].q[m] - (f.at[i][0] * q[0] + f.at[i][1] * q[1] + f.at[i][2] * q[2]);
-    if (m < 3)
-      for (int i = 0; i < 3; ++i)
-        now.drawn[m][i] = back.at[i][0] * now.hourglass[m][0] + back.at[i][1] * now.hourglass[m][1] +
-                          back.at[i][2] * now.hourglass[m][2];
+    const Lanes q[3] = {8 * load(memory.hourglass[m][0]), 8 * load(memory.hourglass[m][1]),
+                        8 * load(memory.hourglass[m][2])};
+    multiply(f, q, now.hourglass[m]);
+    for (int i = 0; i < 3; ++i) now.hourglass[m][i] = u[i].q[m] - now.hourglass[m][i];
+    if (m < 3) multiply(back, now.hourglass[m], now.drawn[m]);
   }
   Lanes s[3][3];
   forces_by_mode(k, now.drawn, s);
-  now.hourglass_square = Lanes{};
-  for (int m = 0; m < 4; ++m)
+  for (int m = 0; m < 4; ++m) {
+    if (m < 3) multiply_transposed(back, s[m], now.by_mode[m]);
     for (int i = 0; i < 3; ++i) {
       now.mode_force[m][i] = k.hourglass[m] * now.hourglass[m][i];
-      if (m < 3) {
-        now.by_mode[m][i] = back.at[0][i] * s[m][0] + back.at[1][i] * s[m][1] + back.at[2][i] * s[m][2];
-        now.mode_force[m][i] += now.by_mode[m][i];
-      }
-      now.hourglass_square += now.hourglass[m][i] * now.mode_force[m][i];
+      if (m < 3) now.mode_force[m][i] += now.by_mode[m][i];
     }
+  }
+  now.hourglass_square = Lanes{};
+  for (int m = 0; m < 4; ++m)
+    for (int i = 0; i < 3; ++i) now.hourglass_square += now.hourglass[m][i] * now.mode_force[m][i];
 }
 
 // What the flow of the mean stress leaves for the hourglass modes: |s| and its bound [Pa].
@@ -202,19 +199,19 @@ FLEXEL_INLINE Yielding flow(const Gradient& g, const CellConstants& k, const Lan
 
 FLEXEL_INLINE void flow_of_hourglass(const Gradient& g, const CellConstants& k, const Lanes& fill,
                                      const Yielding& y, Elastic& now, PlasticBlock& memory, Sums& sums) {
-  const Lanes stress = square_root(6 * k.mu / k.volume * now.hourglass_square);
+  const Lanes stress = square_root(6 * k.mu * now.hourglass_square);
   const Lanes ratio = y.stress / y.bound;
   const Lanes bending = 1.5 * (1 - ratio * ratio);
   const Lanes bound = y.bound * (bending > kHourglassFloor ? bending : Lanes{} + kHourglassFloor);
   const LaneMask yields = (stress > bound) & (fill > 0);
   if (!any(yields)) return;
   const Lanes keep = yields ? bound / stress : Lanes{} + 1;
-  sums.plastic_work += fill * now.hourglass_square * (1 - keep) * keep;
+  sums.plastic_work += fill * k.volume * now.hourglass_square * (1 - keep) * keep;
   const Matrix back = inverse_of(g);
   for (int m = 0; m < 4; ++m) {
     Lanes taken[3];
     for (int i = 0; i < 3; ++i) {
-      taken[i] = (1 - keep) * now.hourglass[m][i];
+      taken[i] = 0.125 * (1 - keep) * now.hourglass[m][i];
       now.hourglass[m][i] = keep * now.hourglass[m][i];
       now.mode_force[m][i] = keep * now.mode_force[m][i];
       if (m < 3) {
@@ -257,13 +254,12 @@ FLEXEL_INLINE Matrix plastic_stress(const Gradient& g, const Elastic& now, const
       for (int n = 0; n < 3; ++n) sum += k.mu * now.strain.at[kEntry[i][n]] * g.cofactor.at[n][j];
       p.at[i][j] = sum * g.inverse;
     }
-  const double per_volume = 1 / k.volume;
   for (int m = 0; m < 4; ++m)
     for (int j = 0; j < 3; ++j) {
-      const Lanes q = per_volume * load(memory.hourglass[m][j]);
+      const Lanes q = 8 * load(memory.hourglass[m][j]);
       for (int i = 0; i < 3; ++i) {
         p.at[i][j] -= now.mode_force[m][i] * q;
-        if (m < 3) p.at[i][j] -= per_volume * (now.by_mode[m][i] * now.drawn[m][j]);
+        if (m < 3) p.at[i][j] -= now.by_mode[m][i] * now.drawn[m][j];
       }
     }
   return p;
@@ -272,8 +268,7 @@ FLEXEL_INLINE Matrix plastic_stress(const Gradient& g, const Elastic& now, const
 // Elastic energy [J] of whole cells.
 FLEXEL_INLINE Lanes elastic_energy(const Elastic& now, const CellConstants& k) {
   return k.volume * (0.5 * k.mu * (now.trace - 2 * now.log_volume) +
-                     0.5 * k.lambda * now.log_volume * now.log_volume) +
-         0.5 * now.hourglass_square;
+                     0.5 * k.lambda * now.log_volume * now.log_volume + 0.5 * now.hourglass_square);
 }
 
 // Lanes that break.

@@ -72,34 +72,25 @@ FLEXEL_INLINE Matrix stress_by_moduli(const Matrix& h, const double* tangent) {
   return p;
 }
 
-// M^T v, M v
-FLEXEL_INLINE void multiply_transposed(const Matrix& m, const Lanes v[3], Lanes to[3]) {
-  for (int i = 0; i < 3; ++i) to[i] = m.at[0][i] * v[0] + m.at[1][i] * v[1] + m.at[2][i] * v[2];
-}
-FLEXEL_INLINE void multiply(const Matrix& m, const Lanes v[3], Lanes to[3]) {
-  for (int i = 0; i < 3; ++i) to[i] = m.at[i][0] * v[0] + m.at[i][1] * v[1] + m.at[i][2] * v[2];
-}
-
-// Adds what the hourglass energy by K changes: of s = K p, forces r_m = G s_m, stress -sum r_m p_m^T / V,
-//     dp_m = G^T (dq_m - H p_m),   dr_m = G (K dp - H^T r)_m.
-FLEXEL_INLINE void add_by_mode(const Matrix& h, const Matrix& g, const double* tangent,
-                               const CellConstants& k, Matrix& stress, Lanes mode_force[4][3],
-                               const Lanes q[3][3]) {
+// Adds what the hourglass energy by K changes: of s = K p, forces r_m = G s_m, stress -sum r_m p_m^T,
+//     dp_m = G^T (dQ_m - H p_m),   dr_m = G (K dp - H^T r)_m.
+FLEXEL_INLINE void add_by_mode(const Matrix& h, const Matrix& g, const double* tangent, const Modes u[3],
+                               const CellConstants& k, Matrix& stress, Lanes mode_force[4][3]) {
   const Lanes share = load(tangent + kLanes * 18);
   Lanes p[3][3], s[3][3], r[3][3], dp[3][3], ds[3][3];
   for (int m = 0; m < 3; ++m)
-    for (int i = 0; i < 3; ++i) p[m][i] = load(tangent + kLanes * static_cast<std::size_t>(9 + 3 * m + i));
+    for (int i = 0; i < 3; ++i)
+      p[m][i] = 8 * load(tangent + kLanes * static_cast<std::size_t>(9 + 3 * m + i));
   forces_by_mode(k, p, s);
   for (int m = 0; m < 3; ++m) {
     Lanes moved[3];
     multiply(h, p[m], moved);
-    for (int i = 0; i < 3; ++i) moved[i] = q[m][i] - moved[i];
+    for (int i = 0; i < 3; ++i) moved[i] = u[i].q[m] - moved[i];
     multiply_transposed(g, moved, dp[m]);
     multiply(g, s[m], r[m]);
     for (int i = 0; i < 3; ++i) r[m][i] = share * r[m][i];
   }
   forces_by_mode(k, dp, ds);
-  const double per_volume = 1 / k.volume;
   for (int m = 0; m < 3; ++m) {
     Lanes turned[3], dr[3];
     multiply_transposed(h, r[m], turned);
@@ -107,8 +98,7 @@ FLEXEL_INLINE void add_by_mode(const Matrix& h, const Matrix& g, const double* t
     multiply(g, turned, dr);
     for (int i = 0; i < 3; ++i) {
       mode_force[m][i] += dr[i];
-      const Lanes a = per_volume * dr[i], b = per_volume * r[m][i];
-      for (int j = 0; j < 3; ++j) stress.at[i][j] -= a * p[m][j] + b * dp[m][j];
+      for (int j = 0; j < 3; ++j) stress.at[i][j] -= dr[i] * p[m][j] + r[m][i] * dp[m][j];
     }
   }
 }
@@ -124,11 +114,12 @@ FLEXEL_INLINE void add_block(const ChunkView& chunk, const CellBlock& block, con
   Matrix h, stress;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) h.at[i][j] = u[i].d[j] * (0.25 / k.spacing[j]);
-  Lanes mode_force[4][3], q[3][3];
+  Lanes mode_force[4][3];
+  [[maybe_unused]] Lanes q[3][3];
   for (int m = 0; m < 4; ++m)
     for (int i = 0; i < 3; ++i) {
-      if (m < 3) q[m][i] = 0.125 * u[i].q[m];
-      mode_force[m][i] = (0.125 * k.hourglass[m]) * u[i].q[m];
+      if (m < 3) q[m][i] = u[i].q[m];
+      mode_force[m][i] = k.hourglass[m] * u[i].q[m];
     }
   if constexpr (form == TangentForm::at_rest) {
     stress = stress_at_rest(h, k);
@@ -143,7 +134,7 @@ FLEXEL_INLINE void add_block(const ChunkView& chunk, const CellBlock& block, con
       stress = stress_deformed(h, g, mean, k);
     else
       stress = stress_by_moduli(h, mean);
-    add_by_mode(h, g, tangent, k, stress, mode_force, q);
+    add_by_mode(h, g, tangent, u, k, stress, mode_force);
   }
   forces_of(stress, mode_force, -load(block.fill), k, corners);  // K u: against the forces
   add_to_corners(chunk, block, corners, scratch.column + kForce);

@@ -5,8 +5,9 @@
 // Model `cells` (simulate/models/cell_model.h) in the lattice frame. With the sums D_j = sum_a s_aj u_a and Q_m =
 // sum_a s_ma u_a of an 8-point Walsh-Hadamard transform,
 //     H_.j = D_j / (4 h_j),  q_m = Q_m / 8,
-//     f_a = -fill { V/4 sum_j P_.j s_aj / h_j + 1/8 sum_m s_ma f_m }:  the same transform backwards,
-// f_m = c_m q_m + r_m, r_m = F^-T (K p)_m, p_m = F^-1 q_m, and P has -sum_m r_m p_m^T / V of the latter.
+//     f_a = -fill V { 1/4 sum_j P_.j s_aj / h_j + sum_m s_ma f_m }:  the same transform backwards,
+// with the sums Q and constants over 64 V f_m = c_m Q_m + r_m, r_m = F^-T (K p)_m, p_m = F^-1 Q_m, and P has -sum_m r_m p_m^T
+// of the latter.
 // P is that of the part's law (simulate/laws).
 //
 // Damping with time tau is the power of the rate of strain, A = sym(F^T dF/dt) without its trace, and of that of the
@@ -48,6 +49,8 @@ struct CellsModel {
     read_corners(chunk, block, scratch.column + kDisplacement, corners);
     for (int i = 0; i < 3; ++i) u[i] = transform(corners, i);
     const Gradient g = gradient_of(u, k, fill, sums);
+    constexpr int drawn_modes = has.damping != Damping::none ? 4 : 3;  // the last one by its rate alone
+    [[maybe_unused]] const Drawn drawn = drawn_back<drawn_modes>(g, u);
     Matrix stress;
     Lanes mode_force[4][3];
     [[maybe_unused]] Elastic now;
@@ -56,7 +59,7 @@ struct CellsModel {
     if constexpr (has.plasticity) elastic = !neo_hooke;  // other laws do not flow
     if (elastic) {
       stress = elastic_stress<has>(g, k, fill, now, sums);
-      add_hourglass(g, u, k, stress, mode_force);
+      add_hourglass(drawn, u, k, stress, mode_force);
       if constexpr (has.fracture || has.plasticity) now.hourglass_square = hourglass_square(u, mode_force);
     } else if constexpr (has.plasticity) {
       PlasticBlock& memory = chunk.plastic[number];
@@ -91,7 +94,7 @@ struct CellsModel {
     if constexpr (has.damping != Damping::none) {
       Matrix viscous = {};
       Lanes viscous_force[4][3];
-      add_damping(g, u, v, k, viscous, viscous_force);
+      add_damping(g, drawn, v, k, viscous, viscous_force);
       if constexpr (has.damping == Damping::book) {
         forces_of(viscous, viscous_force, matter, k, corners);
         add_to_corners(chunk, block, corners, scratch.column + kDampingForce);
@@ -131,7 +134,7 @@ struct CellsModel {
     const Matrix h = g.h;
     Lanes density;
     energy_of_law(k.law, h, density);
-    return k.volume * density + 0.5 * now.hourglass_square;
+    return k.volume * (density + 0.5 * now.hourglass_square);
   }
 
   // Of cells that break with the force f [J]: their energy half a step ago, U + dt/2 f . v, which is what the

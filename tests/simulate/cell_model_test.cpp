@@ -11,6 +11,8 @@
 #include "base/math/eigenvalues.h"
 #include "simulate/laws/elasticity.h"
 #include "simulate/models/prepared_cell.h"
+#include "simulate/models/stability.h"
+#include "tests/simulate/stepped.h"
 
 namespace flexel::simulate {
 namespace {
@@ -389,6 +391,44 @@ TEST(CellModel, InvertedCellHasInfiniteEnergy) {
   Mat3 mirror = Mat3::Zero();
   mirror(0, 0) = -2;
   EXPECT_TRUE(std::isinf(cell_energy(kind, affine_displacements(lattice, mirror, Vec3::Zero()))));
+}
+
+// The bound on the step: of cells squeezed and bent at random by half a spacing and more, as far as none folds.
+TEST(CellModel, StiffnessIsWithinTheBoundOfTheStep) {
+  Random random;
+  int seen = 0;
+  for (const Vec3& h : {Vec3(0.1, 0.1, 0.1), Vec3(0.1, 0.1, 0.04)})
+    for (const Material& material : {rubbery(0), rubbery(0.3), rubbery(0.49)}) {
+      testing::BoxOptions options;
+      options.cells = {1, 1, 1};
+      options.spacing = h;
+      const Body body = testing::box_body(options);
+      const CellKind kind = cell_kind(body.parts[0].lattice, material);
+      const auto largest = [](const std::array<Block, 64>& blocks) {
+        Eigen::Matrix<double, 24, 24> whole;
+        for (Eigen::Index a = 0; a < 8; ++a)
+          for (Eigen::Index b = 0; b < 8; ++b)
+            whole.block<3, 3>(3 * a, 3 * b) = blocks[static_cast<std::size_t>(8 * a + b)];
+        return eigenvalues_symmetric(whole)[23];
+      };
+      const double at_rest = largest(blocks_at_rest(kind));
+      for (int round = 0; round < 60; ++round) {
+        std::vector<Vec3> displacement;
+        const double squeeze = 0.5 * (round % 5) / 4;
+        for (const Vec3& x : body.rest)
+          displacement.push_back(Vec3(0, 0, -squeeze * x.z()) +
+                                 h.minCoeff() * 0.3 * random.displacement(1)[0]);
+        CellVectors u;
+        for (std::size_t a = 0; a < 8; ++a) u[a] = displacement[body.cell_elements[0][a]];
+        if (!(volume_change(displacement_gradient(kind, u)) > -0.9)) continue;
+        const Problem problem = testing::problem_of(body, material);
+        ++seen;
+        EXPECT_LE(largest(tangent_of(kind, u)),
+                  (1 + 1e-9) * at_rest * stiffening(problem, displacement, {{0}})[0])
+            << material.poisson << ", round " << round;
+      }
+    }
+  EXPECT_GT(seen, 200);
 }
 
 }  // namespace

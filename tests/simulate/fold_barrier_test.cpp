@@ -11,6 +11,7 @@
 #include "base/math/dense.h"
 #include "base/math/eigenvalues.h"
 #include "simulate/effects/damping.h"
+#include "simulate/models/prepared_cell.h"
 #include "simulate/stepping/explicit_barrier.h"
 #include "tests/simulate/stepped.h"
 #include "tests/simulate/timed_case.h"
