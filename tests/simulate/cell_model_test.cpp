@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <random>
 
+#include "base/math/dense.h"
 #include "base/math/eigenvalues.h"
 #include "simulate/laws/elasticity.h"
 #include "simulate/models/prepared_cell.h"
