@@ -62,7 +62,9 @@ HourglassTangent hourglass_of(const CellKind& kind, const double* from) {
       p[3 * m + i] = from[kLanes * static_cast<std::size_t>(9 + 3 * m + i)];
     }
   made.pull = made.inverse_transpose.transpose();
-  const Eigen::Matrix<double, 9, 1> s = from[kLanes * 18] * (kind.by_mode * p);
+  made.jacobian = from[kLanes * 18];
+  const Eigen::Matrix<double, 9, 1> s = (from[kLanes * 19] * made.jacobian) * (kind.by_mode * p);
+  made.energy = 0.5 * p.dot(s);
   for (int m = 0; m < 3; ++m) {
     made.arm[static_cast<std::size_t>(m)] = p.segment<3>(3 * m);
     made.force[static_cast<std::size_t>(m)] = made.inverse_transpose * s.segment<3>(3 * m);
@@ -140,7 +142,8 @@ void CellStiffness::prepare_lane(std::uint32_t cell, const State& state, const T
       to[kLanes * column] = prepared.hourglass.inverse_transpose(i, j);
       to[kLanes * (9 + column)] = prepared.hourglass.arm[static_cast<std::size_t>(i)][j];
     }
-  to[kLanes * 18] = tangent.project ? 0 : 1;
+  to[kLanes * 18] = prepared.hourglass.jacobian;
+  to[kLanes * 19] = tangent.project ? 0 : 1;
 }
 
 void CellStiffness::find_folding(const State& state, bool project) {

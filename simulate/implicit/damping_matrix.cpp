@@ -29,7 +29,8 @@ double rate_weight(const CellKind& kind, std::size_t mode, const Vec3& arm, std:
 
 void add_hourglass(const CellKind& kind, const CellVectors& u, const Mat3& turned, std::size_t a,
                    std::array<Mat3, 8>& row) {
-  const HourglassTangent tangent = hourglass_tangent(kind, u, true);
+  HourglassTangent tangent = hourglass_tangent(kind, u, true);
+  tangent.jacobian = 1;  // the dissipation is per volume at rest
   std::array<Block, 8> own;
   own.fill(Block::Zero());
   add_hourglass_row(kind, tangent, 1, a, 0, 8, own.data());

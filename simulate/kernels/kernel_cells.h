@@ -77,19 +77,24 @@ FLEXEL_INLINE Drawn drawn_back(const Gradient& g, const Modes u[3]) {
 }
 
 // Adds the stress of the hourglass energy [Pa]; sets the forces of its modes [Pa/m].
-FLEXEL_INLINE void add_hourglass(const Drawn& drawn, const Modes u[3], const CellConstants& k, Matrix& stress,
-                                 Lanes mode_force[4][3]) {
-  Lanes s[3][3];
+FLEXEL_INLINE void add_hourglass(const Gradient& g, const Drawn& drawn, const Modes u[3],
+                                 const CellConstants& k, Matrix& stress, Lanes mode_force[4][3]) {
+  Lanes s[3][3], energy = {};
   forces_by_mode(k, drawn.p, s);
   for (int m = 0; m < 3; ++m) {
     Lanes r[3];
-    multiply(drawn.inverse_transpose, s[m], r);
+    multiply(g.cofactor, s[m], r);
     for (int i = 0; i < 3; ++i) {
+      energy += drawn.p[m][i] * s[m][i];
       mode_force[m][i] = k.hourglass[m] * u[i].q[m] + r[i];
       for (int j = 0; j < 3; ++j) stress.at[i][j] -= r[i] * drawn.p[m][j];
     }
   }
-  for (int i = 0; i < 3; ++i) mode_force[3][i] = k.hourglass[3] * u[i].q[3];
+  energy *= 0.5;
+  for (int i = 0; i < 3; ++i) {
+    mode_force[3][i] = k.hourglass[3] * u[i].q[3];
+    for (int j = 0; j < 3; ++j) stress.at[i][j] += energy * g.cofactor.at[i][j];
+  }
 }
 
 FLEXEL_INLINE Gradient gradient_of(const Modes modes[3], const CellConstants& k, const Lanes& fill,

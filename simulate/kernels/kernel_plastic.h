@@ -139,7 +139,10 @@ FLEXEL_INLINE void set_hourglass(const Gradient& g, const Modes u[3], const Cell
   Lanes s[3][3];
   forces_by_mode(k, now.drawn, s);
   for (int m = 0; m < 4; ++m) {
-    if (m < 3) multiply_transposed(back, s[m], now.by_mode[m]);
+    if (m < 3) {
+      for (int i = 0; i < 3; ++i) s[m][i] = (1 + now.change) * s[m][i];
+      multiply_transposed(back, s[m], now.by_mode[m]);
+    }
     for (int i = 0; i < 3; ++i) {
       now.mode_force[m][i] = k.hourglass[m] * now.hourglass[m][i];
       if (m < 3) now.mode_force[m][i] += now.by_mode[m][i];
@@ -247,10 +250,13 @@ FLEXEL_INLINE Elastic plastic_state(const Gradient& g, const Modes u[3], const C
 FLEXEL_INLINE Matrix plastic_stress(const Gradient& g, const Elastic& now, const CellConstants& k,
                                     const PlasticBlock& memory) {
   const Lanes pressure = k.lambda * now.log_volume;
+  Lanes by_mode = {};  // energy by K over V
+  for (int m = 0; m < 3; ++m)
+    for (int i = 0; i < 3; ++i) by_mode += 0.5 * now.by_mode[m][i] * now.hourglass[m][i];
   Matrix p;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
-      Lanes sum = pressure * g.cofactor.at[i][j];
+      Lanes sum = (pressure + by_mode) * g.cofactor.at[i][j];
       for (int n = 0; n < 3; ++n) sum += k.mu * now.strain.at[kEntry[i][n]] * g.cofactor.at[n][j];
       p.at[i][j] = sum * g.inverse;
     }

@@ -72,12 +72,13 @@ FLEXEL_INLINE Matrix stress_by_moduli(const Matrix& h, const double* tangent) {
   return p;
 }
 
-// Adds what the hourglass energy by K changes: of s = K p, forces r_m = G s_m, stress -sum r_m p_m^T,
-//     dp_m = G^T (dQ_m - H p_m),   dr_m = G (K dp - H^T r)_m.
+// Adds what the hourglass energy by K changes: of s = J K p, forces r_m = G s_m, stress U G - sum r_m p_m^T with U =
+// 1/2 p s,
+//     dp_m = G^T (dQ_m - H p_m),   dr_m = G (J K dp - H^T r)_m + (G : H) r_m,   dU = (G : H) U + s dp.
 FLEXEL_INLINE void add_by_mode(const Matrix& h, const Matrix& g, const double* tangent, const Modes u[3],
                                const CellConstants& k, Matrix& stress, Lanes mode_force[4][3]) {
-  const Lanes share = load(tangent + kLanes * 18);
-  Lanes p[3][3], s[3][3], r[3][3], dp[3][3], ds[3][3];
+  const Lanes jacobian = load(tangent + kLanes * 18), share = jacobian * load(tangent + kLanes * 19);
+  Lanes p[3][3], s[3][3], r[3][3], dp[3][3], ds[3][3], swells = {}, energy = {}, change = {};
   for (int m = 0; m < 3; ++m)
     for (int i = 0; i < 3; ++i)
       p[m][i] = 8 * load(tangent + kLanes * static_cast<std::size_t>(9 + 3 * m + i));
@@ -87,19 +88,33 @@ FLEXEL_INLINE void add_by_mode(const Matrix& h, const Matrix& g, const double* t
     multiply(h, p[m], moved);
     for (int i = 0; i < 3; ++i) moved[i] = u[i].q[m] - moved[i];
     multiply_transposed(g, moved, dp[m]);
+    for (int i = 0; i < 3; ++i) {
+      s[m][i] = share * s[m][i];
+      swells += g.at[m][i] * h.at[m][i];
+      energy += 0.5 * p[m][i] * s[m][i];
+      change += s[m][i] * dp[m][i];
+    }
     multiply(g, s[m], r[m]);
-    for (int i = 0; i < 3; ++i) r[m][i] = share * r[m][i];
   }
+  change += swells * energy;
   forces_by_mode(k, dp, ds);
   for (int m = 0; m < 3; ++m) {
     Lanes turned[3], dr[3];
     multiply_transposed(h, r[m], turned);
-    for (int i = 0; i < 3; ++i) turned[i] = ds[m][i] - turned[i];
+    for (int i = 0; i < 3; ++i) turned[i] = jacobian * ds[m][i] - turned[i];
     multiply(g, turned, dr);
     for (int i = 0; i < 3; ++i) {
+      dr[i] += swells * r[m][i];
       mode_force[m][i] += dr[i];
       for (int j = 0; j < 3; ++j) stress.at[i][j] -= dr[i] * p[m][j] + r[m][i] * dp[m][j];
     }
+  }
+  for (int i = 0; i < 3; ++i) {  // dG = -G H^T G
+    Lanes across[3], row[3];
+    for (int j = 0; j < 3; ++j)
+      across[j] = g.at[i][0] * h.at[j][0] + g.at[i][1] * h.at[j][1] + g.at[i][2] * h.at[j][2];
+    multiply_transposed(g, across, row);
+    for (int j = 0; j < 3; ++j) stress.at[i][j] += change * g.at[i][j] - energy * row[j];
   }
 }
 

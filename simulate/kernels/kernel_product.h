@@ -11,11 +11,11 @@ namespace flexel::simulate::step {
 //   deformed   kHourglassColumns, c = mu - lambda ln J, added stress S (xx, yy, zz, xy, yz, zx) [Pa]:
 //              dP = mu H + c G H^T G + lambda (G : H) G + H S
 //   moduli     kHourglassColumns, dP/dH (9 x 9) [Pa]
-// kHourglassColumns: G = F^-T (9, row by row), p_m = F^-1 q_m (3 of each of xy, yz, zx) [m], and the share that their forces
-// have in the tangent: 1, or 0 where it is projected.
+// kHourglassColumns: G = F^-T (9, row by row), p_m = F^-1 q_m (3 of each of xy, yz, zx) [m], J, and the share that their
+// forces have in the tangent: 1, or 0 where it is projected.
 enum class TangentForm { at_rest, deformed, moduli };
 constexpr std::size_t kTangentForms = 3;
-constexpr std::size_t kHourglassColumns = 19;
+constexpr std::size_t kHourglassColumns = 20;
 constexpr std::size_t kTangentColumns[kTangentForms] = {0, kHourglassColumns + 7, kHourglassColumns + 81};
 
 // y = K x on the elements that the chunk owns, K x on the others to chunk.shared_force; x, y (n x 3) N, m in

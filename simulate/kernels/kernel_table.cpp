@@ -6,8 +6,8 @@
 // sum_a s_ma u_a of an 8-point Walsh-Hadamard transform,
 //     H_.j = D_j / (4 h_j),  q_m = Q_m / 8,
 //     f_a = -fill V { 1/4 sum_j P_.j s_aj / h_j + sum_m s_ma f_m }:  the same transform backwards,
-// with the sums Q and constants over 64 V f_m = c_m Q_m + r_m, r_m = F^-T (K p)_m, p_m = F^-1 Q_m, and P has -sum_m r_m p_m^T
-// of the latter.
+// with the sums Q and constants over 64 V f_m = c_m Q_m + r_m, r_m = cof F (K p)_m, p_m = F^-1 Q_m, and P has
+// 1/2 p K p cof F - sum_m r_m p_m^T of the latter.
 // P is that of the part's law (simulate/laws).
 //
 // Damping with time tau is the power of the rate of strain, A = sym(F^T dF/dt) without its trace, and of that of the
@@ -59,7 +59,7 @@ struct CellsModel {
     if constexpr (has.plasticity) elastic = !neo_hooke;  // other laws do not flow
     if (elastic) {
       stress = elastic_stress<has>(g, k, fill, now, sums);
-      add_hourglass(drawn, u, k, stress, mode_force);
+      add_hourglass(g, drawn, u, k, stress, mode_force);
       if constexpr (has.fracture || has.plasticity) now.hourglass_square = hourglass_square(u, mode_force);
     } else if constexpr (has.plasticity) {
       PlasticBlock& memory = chunk.plastic[number];

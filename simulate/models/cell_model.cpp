@@ -196,13 +196,14 @@ HourglassForces hourglass_forces(const CellKind& kind, const Mat3& h, const std:
   HourglassForces made;
   const Mat3 inverse = (Mat3::Identity() + h).inverse();
   made.pull = kind.to_lattice * inverse;
+  made.inverse_transpose = inverse.transpose();
   Eigen::Matrix<double, 9, 1> p;
   for (int m = 0; m < 3; ++m) {
     const Vec3& each = q[static_cast<std::size_t>(m)];
     made.arm[static_cast<std::size_t>(m)] = inverse * each;
     p.segment<3>(3 * m) = made.pull * each;
   }
-  const Eigen::Matrix<double, 9, 1> s = kind.by_mode * p;
+  const Eigen::Matrix<double, 9, 1> s = (1 + volume_change(h)) * (kind.by_mode * p);
   for (int m = 0; m < 3; ++m)
     made.force[static_cast<std::size_t>(m)] = made.pull.transpose() * s.segment<3>(3 * m);
   made.energy = 0.5 * p.dot(s);
@@ -224,8 +225,9 @@ CellVectors cell_forces(const CellKind& kind, const CellVectors& u) {
   const std::array<Vec3, 4> q = hourglass_displacements(kind, u);
   const HourglassForces by_mode = hourglass_forces(kind, h, q);
   CellVectors forces;
+  const Mat3 mean = first_piola + (0.25 * by_mode.energy) * by_mode.inverse_transpose;
   for (std::size_t a = 0; a < 8; ++a) {
-    Vec3 force = first_piola * kind.gradient[a];
+    Vec3 force = mean * kind.gradient[a];
     for (std::size_t m = 0; m < 4; ++m) force += (kind.hourglass[m] * kind.mode[m][a]) * q[m];
     for (std::size_t m = 0; m < 3; ++m)
       force += (kind.mode[m][a] - 0.25 * kind.gradient[a].dot(by_mode.arm[m])) * by_mode.force[m];

@@ -20,11 +20,12 @@
 // so pure bending and pure twisting of cells have the energy of the matter. For cubes these are (4/3) mu h [2 1 1; 1 2 1; 1 1 2]
 // and (4/3) h E / (1 - nu^2) [1 nu; nu 1]. The field xi eta zeta has c_xyz = (4/27) V sum_j 2 mu / h_j^2 for each component.
 //
-// Where the cell is deformed, q is drawn back into the lattice's axes by F^-1, which turns it with the cell, and whose stretch
-// is that by which neo-Hooke's stiffness grows. The share theta of c_m = (4/3) V (1/hx^2 + 1/hy^2), and likewise yz, zx, that
+// Where the cell is deformed, q is drawn back into the lattice's axes by F^-1, which turns it with the cell, and the energy is that
+// per volume now: so it does not change where a linear answer turns a cell by I + W, W skew, which stretches it across the axis
+// of W as Newton's method does on its way. The share theta of c_m = (4/3) V (1/hx^2 + 1/hy^2), and likewise yz, zx, that
 // the smallest eigenvalue allows (one half of mu for isotropic cubes) is taken of |q_m|^2 instead, as neo-Hooke's mu/2 F:F
 // is, and no stretch softens it. So the energy is a sum of squares:
-//     U_h = 1/2 sum_m c_m |q_m|^2 + 1/2 p^T K p,   p_m = axes^T F^-1 q_m,   m in {xy, yz, zx} in p.
+//     U_h = 1/2 sum_m c_m |q_m|^2 + J/2 p^T K p,   p_m = axes^T F^-1 q_m,   m in {xy, yz, zx} in p.
 #pragma once
 #include <array>
 
@@ -94,9 +95,10 @@ using CellVectors = std::array<Vec3, 8>;  // one vector per element of a cell
                                                           const CellVectors& displacement);
 
 // Of the energy by K, with e = hourglass_displacements(): arms F^-1 e_m [m], forces dU/de_m [N] of xy, yz, zx, energy [J];
-// axes^T F^-1 (axes^T G (F G)^-1). The force on element a is -sum_m (w_ma - gamma_a . arm_m / 4) force_m.
+// axes^T F^-1 (axes^T G (F G)^-1), F^-T. The force on element a is -sum_m (w_ma - gamma_a . arm_m / 4) force_m
+// - energy F^-T gamma_a / 4.
 struct HourglassForces {
-  Mat3 pull;
+  Mat3 pull, inverse_transpose;
   std::array<Vec3, 3> arm, force;
   double energy = 0;
 };

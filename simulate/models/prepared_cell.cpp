@@ -28,9 +28,14 @@ Mat9 prepare_moduli(const CellKind& kind, const Mat3& gradient, bool project, co
 HourglassTangent hourglass_tangent(const CellKind& kind, const CellVectors& u, bool project) {
   const Mat3 gradient = displacement_gradient(kind, u);
   const HourglassForces forces = hourglass_forces(kind, gradient, hourglass_displacements(kind, u));
-  HourglassTangent tangent{(Mat3::Identity() + gradient).inverse().transpose(), forces.pull, forces.arm,
-                           forces.force};
+  HourglassTangent tangent{forces.inverse_transpose,
+                           1 + volume_change(gradient),
+                           forces.pull,
+                           forces.arm,
+                           forces.force,
+                           forces.energy};
   if (project) tangent.force.fill(Vec3::Zero());
+  if (project) tangent.energy = 0;
   return tangent;
 }
 
@@ -45,18 +50,20 @@ void add_hourglass_row(const CellKind& kind, const HourglassTangent& tangent, do
     Mat3 sum = Mat3::Zero();
     for (int m = 0; m < 3; ++m)
       sum += weight[static_cast<std::size_t>(m)][a] * kind.by_mode.block<3, 3>(3 * m, 3 * n);
-    row[static_cast<std::size_t>(n)] = factor * tangent.pull.transpose() * sum * tangent.pull;
+    row[static_cast<std::size_t>(n)] =
+        (factor * tangent.jacobian) * tangent.pull.transpose() * sum * tangent.pull;
   }
   const auto force_at = [&](std::size_t b) -> Vec3 {
     return weight[0][b] * tangent.force[0] + weight[1][b] * tangent.force[1] +
            weight[2][b] * tangent.force[2];
   };
-  const Vec3 w_a = tangent.inverse_transpose * (-0.25 * factor * kind.gradient[a]);
-  const Vec3 r_a = -0.25 * factor * force_at(a);
+  const Vec3 w_a = tangent.inverse_transpose * (0.25 * factor * kind.gradient[a]);
+  // What w_b meets on its right, times the factor: r_a and the energy's share.
+  const Vec3 with = 0.25 * (factor * force_at(a) + tangent.energy * w_a);
   for (std::size_t b = begin; b < end; ++b) {
+    const Vec3 w_b = tangent.inverse_transpose * kind.gradient[b], r_b = force_at(b);
     for (std::size_t n = 0; n < 3; ++n) out[b] += weight[n][b] * row[n];
-    out[b] += tangent.inverse_transpose * kind.gradient[b] * r_a.transpose();
-    out[b] += force_at(b) * w_a.transpose();
+    out[b] += with * w_b.transpose() - w_b * with.transpose() + w_a * r_b.transpose() - r_b * w_a.transpose();
   }
 }
 

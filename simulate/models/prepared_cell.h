@@ -8,12 +8,15 @@ namespace flexel::simulate {
 
 // d2U/du du of the hourglass energy by K. With the weights v_ma = w_ma - gamma_a . arm_m / 4, w_a = F^-T gamma_a
 // and r_a = sum_m v_ma force_m,
-//     K_ab = pull^T [sum_mn v_ma v_nb K_mn] pull - 1/4 (w_b r_a^T + r_b w_a^T).
+//     K_ab = J pull^T [sum_mn v_ma v_nb K_mn] pull + 1/4 (w_a r_b^T - r_b w_a^T + r_a w_b^T - w_b r_a^T)
+//            + U / 16 (w_a w_b^T - w_b w_a^T).
 // The first term is positive.
 struct HourglassTangent {
   Mat3 inverse_transpose = Mat3::Identity();  // F^-T
+  double jacobian = 1;
   Mat3 pull;
-  std::array<Vec3, 3> arm, force;  // m, N; the forces 0 where the tangent is projected
+  std::array<Vec3, 3> arm, force;  // m, N; forces and energy 0 where the tangent is projected
+  double energy = 0;               // J
 };
 [[nodiscard]] HourglassTangent hourglass_tangent(const CellKind& kind, const CellVectors& displacement,
                                                  bool project);

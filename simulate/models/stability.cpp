@@ -50,10 +50,11 @@ bool is_springs(const Problem& problem, std::size_t part) {
   return problem.models.size() > part && problem.models[part] == Model::springs;
 }
 
-// Of the hourglass energy of a deformed cell: stiffness k (c_m + K / s_min^2), s_min the least stretch, and
-// |p| = sqrt(sum_m |F^-1 q_m|^2) over the least spacing h.
+// Of the hourglass modes of a deformed cell: c_m, K / s_min^2, s_min the least stretch, J, and sqrt(sum_m |F^-1 q_m|^2) over
+// the least spacing h.
 struct HourglassGrowth {
-  double stiffness = 0, by_mode = 0, drawn = 0, over_spacing = 0;  // N/m, N/m, m, 1
+  double free = 0, by_mode = 0;  // N/m
+  double jacobian = 1, drawn = 0;
 };
 
 HourglassGrowth hourglass_growth(const CellKind& kind, const Vec3& spacing, const CellVectors& u,
@@ -61,26 +62,26 @@ HourglassGrowth hourglass_growth(const CellKind& kind, const Vec3& spacing, cons
   const Mat3 f = Mat3::Identity() + gradient;
   Eigen::SelfAdjointEigenSolver<Mat3> eigen;
   eigen.computeDirect(f.transpose() * f, Eigen::EigenvaluesOnly);
-  const double least = std::max(eigen.eigenvalues()[0], 1e-12);
-  const std::array<Vec3, 4> q = hourglass_displacements(kind, u);
   const Mat3 inverse = f.inverse();
   HourglassGrowth growth;
-  for (const Vec3& each : q) growth.drawn += (inverse * each).squaredNorm();
-  growth.drawn = std::sqrt(growth.drawn);
-  growth.by_mode = kind.by_mode_largest / least;
-  growth.stiffness = *std::max_element(kind.hourglass.begin(), kind.hourglass.end()) + growth.by_mode;
-  growth.over_spacing = growth.drawn / spacing.minCoeff();
+  double square = 0;
+  for (const Vec3& each : hourglass_displacements(kind, u)) square += (inverse * each).squaredNorm();
+  growth.free = *std::max_element(kind.hourglass.begin(), kind.hourglass.end());
+  growth.by_mode = kind.by_mode_largest / std::max(eigen.eigenvalues()[0], 1e-12);
+  growth.jacobian = 1 + volume_change(gradient);
+  growth.drawn = std::sqrt(square) / spacing.minCoeff();
   return growth;
 }
 
-// Over the largest eigenvalue at rest `largest` [N/m], at most: alone, and what the coupling of q_m with F adds. The second
-// derivative of 1/2 p K p is at most k' (|dq| + |dF| |p|)^2 + 2 k' |p| |dF| (|dq| + |dF| |p|), k' = K / s_min^2, and of
-// displacements of size 1 |dq|^2 is at most 1/8, |dF|^2 1 / (2 h^2), |dq| |dF| 1 / (8 h).
+// Of the energy over the largest eigenvalue at rest `largest` [N/m], at most: alone, and what the coupling of q_m with F adds.
+// With k = J K / s_min^2 the second derivative of J/2 p K p is at most k times
+//     (|dq| + |dF| |p|)^2 + 2 (1 + sqrt 3) |p| |dF| (|dq| + |dF| |p|) + 2 |p|^2 |dF|^2,
+// and of displacements of size 1 |dq|^2 is at most 1/8, |dF|^2 1 / (2 h^2), |dq| |dF| 1 / (8 h).
 double alone(const HourglassGrowth& growth, double largest) {
-  return growth.stiffness / 8 / largest;
+  return (growth.free + growth.jacobian * growth.by_mode) / 8 / largest;
 }
 double coupling(const HourglassGrowth& growth, double largest) {
-  return growth.by_mode * growth.over_spacing * (0.5 + 1.5 * growth.over_spacing) / largest;
+  return growth.jacobian * growth.by_mode * growth.drawn * (1 + 4.3 * growth.drawn) / largest;
 }
 
 // Of a whole cell [N/m].
@@ -167,9 +168,10 @@ double damping_growth(const CellKind& kind, const Vec3& spacing, const CellVecto
   const Mat3 f = Mat3::Identity() + displacement_gradient(kind, u);
   if (f == Mat3::Identity()) return 1;
   const HourglassGrowth hourglass = hourglass_growth(kind, spacing, u, f - Mat3::Identity());
-  const double turned = hourglass.stiffness * std::pow(hourglass.over_spacing, 2) / 2;  // N/m
+  const double stiffness = hourglass.free + hourglass.by_mode;
+  const double turned = stiffness * hourglass.drawn * hourglass.drawn / 2;  // N/m
   const double ratio = spacing.maxCoeff() / spacing.minCoeff();
-  const double still = std::max(ratio * rate_growth(kind, f, polar(f)), std::sqrt(alone(hourglass, largest)));
+  const double still = std::max(ratio * rate_growth(kind, f, polar(f)), std::sqrt(stiffness / 8 / largest));
   return std::pow(still + std::sqrt(turned / largest), 2);
 }
 
