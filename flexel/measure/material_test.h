@@ -10,11 +10,9 @@
 // contraction of the drawn one. Where the strain is constant over a cell the result is the material at any n.
 // Under bending and twisting it varies inside a cell, and the error falls as 1 / n^2 (limit_of).
 //
-// The hourglass connections of `cells` have one stiffness, c = 8/3 mu h, which is right for bending at nu =
-// 0: there q = kappa h^2 / 4 has the energy c q^2 / 2 = E kappa^2 h^5 / 24, that of the matter. A cell
-// twisted by theta per length has two such q = theta h^2 / 4 and the energy mu theta^2 h^5 / 6, twice that of
-// its matter: over the section (1/6) / 0.1406 / n^2 = 1.19 / n^2 too stiff. Measured is 2.0 / n^2; the rest
-// is warping within cells.
+// The hourglass connections of `cells` have the stiffness of the matter for pure bending and for twisting by mode
+// (simulate/models/cell_model.h), so a bent bar is exact. A twisted one of section a x a has the energy of its matter but for
+// the warping within the cells.
 #pragma once
 #include <vector>
 

@@ -62,6 +62,26 @@ bool same_row(const StiffnessPattern& pattern, const std::vector<std::uint32_t>&
 
 constexpr int kStressOf[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
 
+// From the columns of one lane; lattice frame.
+HourglassTangent hourglass_of(const CellKind& kind, const double* from) {
+  HourglassTangent made;
+  Eigen::Matrix<double, 9, 1> p;
+  for (int m = 0; m < 3; ++m)
+    for (int i = 0; i < 3; ++i) {
+      made.inverse_transpose(m, i) = from[kLanes * static_cast<std::size_t>(3 * m + i)];
+      p[3 * m + i] = from[kLanes * static_cast<std::size_t>(9 + 3 * m + i)];
+    }
+  made.pull = made.inverse_transpose.transpose();
+  made.jacobian = from[kLanes * 18];
+  const Eigen::Matrix<double, 9, 1> s = (from[kLanes * 19] * made.jacobian) * (kind.by_mode * p);
+  made.energy = 0.5 * p.dot(s);
+  for (int m = 0; m < 3; ++m) {
+    made.arm[static_cast<std::size_t>(m)] = p.segment<3>(3 * m);
+    made.force[static_cast<std::size_t>(m)] = made.inverse_transpose * s.segment<3>(3 * m);
+  }
+  return made;
+}
+
 }  // namespace
 
 bool CellStiffness::fits(const Problem& problem, const PaperModel& paper) {
@@ -221,22 +241,31 @@ void CellStiffness::prepare_lane(std::uint32_t cell, const State& state, const T
     u[a] = axes.transpose() * state.displacement[body_.cell_elements[cell][a]];
   Mat3 stress;
   if (tangent.stress) stress = axes.transpose() * (*tangent.stress)[cell] * axes;
-  const Mat3 gradient = displacement_gradient(part.kind, u);
   const Mat3* given = tangent.stress ? &stress : nullptr;
+  PreparedCell prepared;
   if (form_ == TangentForm::moduli) {
-    const Mat9 moduli = prepare_moduli(part.kind, gradient, tangent.project, given);
+    prepared.hourglass = hourglass_tangent(part.kind, u, tangent.project);
+    const Mat9 moduli =
+        prepare_moduli(part.kind, displacement_gradient(part.kind, u), tangent.project, given);
     for (std::size_t c = 0; c < 81; ++c)
-      to[kLanes * c] = moduli(static_cast<Eigen::Index>(c / 9), static_cast<Eigen::Index>(c % 9));
-    return;
+      to[kLanes * (step::kHourglassColumns + c)] =
+          moduli(static_cast<Eigen::Index>(c / 9), static_cast<Eigen::Index>(c % 9));
+  } else {
+    prepared = prepare_cell(part.kind, u, tangent.project, given);
+    double* mean = to + kLanes * step::kHourglassColumns;
+    mean[0] = prepared.coupling;
+    for (int i = 0; i < 3; ++i)
+      for (int j = i; j < 3 && prepared.added_stress; ++j)
+        mean[kLanes * static_cast<std::size_t>(1 + kStressOf[i][j])] = (*prepared.added_stress)(i, j);
   }
-  const PreparedCell prepared = prepare_cell(part.kind, gradient, tangent.project, given);
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
-      to[kLanes * static_cast<std::size_t>(3 * i + j)] = prepared.tangent.inverse_transpose(i, j);
-      if (prepared.added_stress && j >= i)
-        to[kLanes * static_cast<std::size_t>(10 + kStressOf[i][j])] = (*prepared.added_stress)(i, j);
+      const auto column = static_cast<std::size_t>(3 * i + j);
+      to[kLanes * column] = prepared.hourglass.inverse_transpose(i, j);
+      to[kLanes * (9 + column)] = prepared.hourglass.arm[static_cast<std::size_t>(i)][j];
     }
-  to[kLanes * 9] = prepared.coupling;
+  to[kLanes * 18] = prepared.hourglass.jacobian;
+  to[kLanes * 19] = tangent.project ? 0 : 1;
 }
 
 void CellStiffness::find_folding(const State& state, bool project) {
@@ -409,32 +438,34 @@ void CellStiffness::multiply(const double* x, double* y) const {
 void CellStiffness::deformed_blocks(const PartKind& part, const double* from, double share, std::size_t a,
                                     std::size_t begin, std::size_t end, Block* out) const {
   const CellKind& kind = part.kind;
+  const double* mean = from + kLanes * step::kHourglassColumns;
+  const HourglassTangent hourglass = hourglass_of(kind, from);
   if (form_ == TangentForm::moduli) {
     Mat9 moduli;
     for (std::size_t c = 0; c < 81; ++c)
-      moduli(static_cast<Eigen::Index>(c / 9), static_cast<Eigen::Index>(c % 9)) = from[kLanes * c];
+      moduli(static_cast<Eigen::Index>(c / 9), static_cast<Eigen::Index>(c % 9)) = mean[kLanes * c];
     for (std::size_t b = begin; b < end; ++b) out[b] = share * projected_block(kind, moduli, a, b);
+    add_hourglass_row(kind, hourglass, share, a, begin, end, out);
     return;
   }
-  Mat3 g, added;
+  const Mat3& g = hourglass.inverse_transpose;
+  Mat3 added;
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) {
-      g(i, j) = from[kLanes * static_cast<std::size_t>(3 * i + j)];
-      added(i, j) = from[kLanes * static_cast<std::size_t>(10 + kStressOf[i][j])];
-    }
+    for (int j = 0; j < 3; ++j) added(i, j) = mean[kLanes * static_cast<std::size_t>(1 + kStressOf[i][j])];
   const double scale = share * kind.volume / 16;
   std::array<Vec3, 8> w;
   for (std::size_t b = 0; b < 4; ++b) {
     w[b] = g * kind.gradient[b];
     w[7 - b] = -w[b];
   }
-  const Vec3 symmetric = (scale * kind.lambda) * w[a], swapped = (scale * from[kLanes * 9]) * w[a];
+  const Vec3 symmetric = (scale * kind.lambda) * w[a], swapped = (scale * mean[0]) * w[a];
   const Vec3 stressed = scale * (added * kind.gradient[a]);
   for (std::size_t b = begin; b < end; ++b) {
     out[b].noalias() = symmetric * w[b].transpose();
     out[b].noalias() += w[b] * swapped.transpose();
     out[b].diagonal().array() += share * kind.diagonal[8 * a + b] + stressed.dot(kind.gradient[b]);
   }
+  add_hourglass_row(kind, hourglass, share, a, begin, end, out);
 }
 
 void CellStiffness::cell_blocks(const Incidence& at, std::size_t begin, std::size_t end, Block* out) const {

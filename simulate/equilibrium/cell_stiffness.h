@@ -2,7 +2,7 @@
 // by cell, eight side by side (simulate/kernels/kernel_product.h), and rows of blocks made when the hierarchy
 // asks for them. What effects add (ties, bonds) is stored in a small matrix beside it.
 //
-// Memory: 0, 128 or 648 bytes a cell (at rest; deformed; projected moduli) beside the pattern, where the
+// Memory: 0, 216 or 808 bytes a cell (at rest; deformed; projected moduli) beside the pattern, where the
 // blocks of a stored matrix take 1,944 an element.
 #pragma once
 #include "simulate/conditions/constraints.h"

@@ -4,7 +4,7 @@
 // twice as long, later each time that this was in vain (load_step_length.h). The Newton iterations of a run are
 // bounded: a scene without an equilibrium ends in the time of some hundred linear solutions.
 //
-// A rotation is followed along its arc, a quarter of a turn a load step at most: further on the straight way
+// A rotation is followed along its arc, an eighth of a turn a load step at most: further on the straight way
 // to its end is none, and a whole turn would end where it began. Where the load steps shrink to nothing
 // though the forces are all but balanced, the part buckles, and symmetry keeps Newton's method on the branch
 // that is not stable any more. There a small, smooth push to a side starts steps that lower the energy; what
@@ -50,7 +50,7 @@ constexpr int kUnilateralIterations = 300;  // likewise where surfaces touch: so
 constexpr int kOverloadIterations = 40;     // likewise where the load is out of proportion
 constexpr int kIterationsPerLoadStep = 10;  // that one which ends in equilibrium adds to those of the run
 constexpr int kIterationsPerUnilateralStep = 40;  // likewise, where surfaces touch
-constexpr double kLargestTurn = 0.25;             // turns, of a rotation in one load step
+constexpr double kLargestTurn = 0.125;            // turns, of a rotation in one load step
 constexpr double kBalanced = 1e-2;         // relative residual of an attempt that fails as buckling does
 constexpr double kPush = 0.01;             // of the spacing, to leave a branch with
 constexpr double kPushedIncrement = 0.25;  // of the first load step: how far beyond the branching

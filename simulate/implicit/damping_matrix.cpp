@@ -2,9 +2,10 @@
 // K = lambda + 2 mu / 3, has the blocks
 //     C_ab = tau V / 16 { K (c_a)(c_b)^T + mu (g_a . g_b) F F^T + mu (F g_b)(F g_a)^T - 2 mu / 3 (F g_a)(F g_b)^T },
 // g the gradients gamma of simulate/models/cell_model.h, c = cof F g; of an orthotropic material the moduli C at
-// rest, F C(g_a, g_b) F^T. The hourglass displacements q_m resist their rate as seen
-// by an observer that turns with the cell, q' = dq/dt - w x q = sum_b B_mb v_b with the spin w = 1/2 sum_b
-// F^-T g_b / 4 x v_b; they add tau c_m B_ma^T B_mb. A spring from a to b along the unit vector d adds tau k d
+// rest, F C(g_a, g_b) F^T. The hourglass displacements q_m resist their rate
+// as seen by an observer that is deformed with the cell, q' = dq/dt - dF/dt F^-1 q = sum_b v_mb v_b with the weights v_mb =
+// s_mb / 8 - g_b . F^-1 q_m / 4: they add tau c_m v_ma v_mb I and, by K, tau F^-T axes [sum v_ma v_nb K_mn] axes^T F^-1.
+// A spring from a to b along the unit vector d adds tau k d
 // d^T. Each row is gathered by one thread from its cells in ascending order.
 #include "simulate/implicit/damping_matrix.h"
 
@@ -12,19 +13,34 @@
 #include <Eigen/LU>
 #include <optional>
 
-#include "base/math/small_matrices.h"
 #include "base/parallel.h"
 #include "simulate/models/cells.h"
 #include "simulate/models/damping_factors.h"
+#include "simulate/models/prepared_cell.h"
 #include "simulate/models/rest_shape.h"
 
 namespace flexel::simulate {
 namespace {
 
-Vec3 hourglass(const CellVectors& u, int mode) {
-  Vec3 sum = Vec3::Zero();
-  for (int a = 0; a < 8; ++a) sum += hourglass_sign(mode, a) * u[static_cast<std::size_t>(a)];
-  return sum / 8;
+// v_mb, q'_m = sum_b v_mb v_b. `arm`: F^-1 q_m.
+double rate_weight(const CellKind& kind, std::size_t mode, const Vec3& arm, std::size_t corner) {
+  return kind.mode[mode][corner] - 0.25 * kind.gradient[corner].dot(arm);
+}
+
+void add_hourglass(const CellKind& kind, const CellVectors& u, const Mat3& turned, std::size_t a,
+                   std::array<Mat3, 8>& row) {
+  HourglassTangent tangent = hourglass_tangent(kind, u, true);
+  tangent.jacobian = 1;  // the dissipation is per volume at rest
+  std::array<Block, 8> own;
+  own.fill(Block::Zero());
+  add_hourglass_row(kind, tangent, 1, a, 0, 8, own.data());
+  for (std::size_t b = 0; b < 8; ++b) row[b] += own[b];
+  const std::array<Vec3, 4> q = hourglass_displacements(kind, u);
+  for (std::size_t mode = 0; mode < 4; ++mode) {
+    const Vec3 arm = turned.transpose() * q[mode];
+    const double scale = kind.hourglass[mode] * rate_weight(kind, mode, arm, a);
+    for (std::size_t b = 0; b < 8; ++b) row[b].diagonal().array() += scale * rate_weight(kind, mode, arm, b);
+  }
 }
 
 // Row a of one cell's C, over its tau and fill.
@@ -52,15 +68,7 @@ std::array<Mat3, 8> damping_row(const CellKind& kind, const CellVectors& u, std:
               kind.mu * (kind.gradient[a].dot(kind.gradient[b]) * metric + other * at.transpose() -
                          2.0 / 3 * at * other.transpose()));
   }
-  for (int mode = 0; mode < 4; ++mode) {
-    const Mat3 arm = cross_matrix(hourglass(u, mode));
-    const auto rate = [&](std::size_t corner) -> Mat3 {
-      return hourglass_sign(mode, static_cast<int>(corner)) / 8 * Mat3::Identity() +
-             arm * cross_matrix(turned * kind.gradient[corner]) / 8;
-    };
-    const Mat3 own = kind.hourglass[static_cast<std::size_t>(mode)] * rate(a).transpose();
-    for (std::size_t b = 0; b < 8; ++b) row[b] += own * rate(b);
-  }
+  add_hourglass(kind, u, turned, a, row);
   return row;
 }
 

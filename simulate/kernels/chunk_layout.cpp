@@ -30,7 +30,16 @@ step::CellConstants constants_of(const Part& part, const Material& material, dou
   c.volume = kind.volume;
   c.mu = kind.mu;
   c.lambda = kind.lambda;
-  for (std::size_t m = 0; m < 4; ++m) c.hourglass[m] = kind.hourglass[m];
+  const double per = 1 / (64 * kind.volume);
+  for (std::size_t m = 0; m < 4; ++m) c.hourglass[m] = per * kind.hourglass[m];
+  for (int j = 0; j < 3; ++j) {
+    const int twists = 3 * j + (j + 2) % 3, k = 3 * j + (j + 1) % 3, l = 4 * ((j + 2) % 3);
+    for (int other = 0; other < 3; ++other)
+      c.twisting[j][other] = per * kind.by_mode(twists, 3 * other + (other + 2) % 3);
+    c.bending[j][0] = per * kind.by_mode(k, k);
+    c.bending[j][1] = per * kind.by_mode(k, l);
+    c.bending[j][2] = per * kind.by_mode(l, l);
+  }
   // corners 0 and 1 (edge), 3 (across a face), 7 (through the centre)
   for (const Spring& spring : spring_kind(part.lattice, material).springs)
     if (spring.a == 0 && (spring.b == 1 || spring.b == 3 || spring.b == 7))

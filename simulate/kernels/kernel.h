@@ -43,11 +43,15 @@ struct ConnectionKind {
 
 // What all cells of a part have in common. Lattice frame: axis j is column j of `axes`.
 struct CellConstants {
-  double spacing[3];    // m
-  double volume;        // m^3
-  double mu, lambda;    // Pa
-  double hourglass[4];  // N/m, of the modes xy, yz, zx, xyz
-  double spring[3];     // N/m, a cell's share of a spring along an edge, across a face, through the centre
+  double spacing[3];  // m
+  double volume;      // m^3
+  double mu, lambda;  // Pa
+  // Of sums Q = 8 q and per volume, over 64 V [Pa/m^2]: c_m of the modes xy, yz, zx, xyz (simulate/models/cell_model.h)
+  double hourglass[4];
+  // Likewise K: of the components z, x, y of xy, yz, zx; of each axis j the components of its neighbours k and l
+  // of modes jk and lj: kk, kl, ll
+  double twisting[3][3], bending[3][3];
+  double spring[3];  // N/m, a cell's share of a spring along an edge, across a face, through the centre
   ConnectionKind connection[13];  // half_neighbourhood (formats/lattice/body.h)
   double damping;                 // s; 0 in the variants without damping
   double yield, hardening;        // Pa, J2 yield stress and its isotropic, linear hardening

@@ -39,6 +39,64 @@ FLEXEL_INLINE void transform_back(const Modes& t, int c, Corners& f) {
   }
 }
 
+// s = K p of the modes xy, yz, zx. Of sums Q, K and c_m are per volume: forces dW/dQ [Pa/m].
+FLEXEL_INLINE void forces_by_mode(const CellConstants& k, const Lanes p[3][3], Lanes s[3][3]) {
+  for (int m = 0; m < 3; ++m)
+    s[m][(m + 2) % 3] = k.twisting[m][0] * p[0][2] + k.twisting[m][1] * p[1][0] + k.twisting[m][2] * p[2][1];
+  for (int j = 0; j < 3; ++j) {
+    const int a = (j + 1) % 3, b = (j + 2) % 3;
+    s[j][a] = k.bending[j][0] * p[j][a] + k.bending[j][1] * p[b][b];
+    s[b][b] = k.bending[j][1] * p[j][a] + k.bending[j][2] * p[b][b];
+  }
+}
+
+// M v, M^T v
+FLEXEL_INLINE void multiply(const Matrix& m, const Lanes v[3], Lanes to[3]) {
+  for (int i = 0; i < 3; ++i) to[i] = m.at[i][0] * v[0] + m.at[i][1] * v[1] + m.at[i][2] * v[2];
+}
+FLEXEL_INLINE void multiply_transposed(const Matrix& m, const Lanes v[3], Lanes to[3]) {
+  for (int i = 0; i < 3; ++i) to[i] = m.at[0][i] * v[0] + m.at[1][i] * v[1] + m.at[2][i] * v[2];
+}
+
+// F^-T, and the sums Q drawn back, p_m = F^-1 Q_m [m].
+struct Drawn {
+  Matrix inverse_transpose;
+  Lanes p[4][3];
+};
+
+template <int modes>
+FLEXEL_INLINE Drawn drawn_back(const Gradient& g, const Modes u[3]) {
+  Drawn drawn;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) drawn.inverse_transpose.at[i][j] = g.inverse * g.cofactor.at[i][j];
+  for (int m = 0; m < modes; ++m) {
+    const Lanes q[3] = {u[0].q[m], u[1].q[m], u[2].q[m]};
+    multiply_transposed(drawn.inverse_transpose, q, drawn.p[m]);
+  }
+  return drawn;
+}
+
+// Adds the stress of the hourglass energy [Pa]; sets the forces of its modes [Pa/m].
+FLEXEL_INLINE void add_hourglass(const Gradient& g, const Drawn& drawn, const Modes u[3],
+                                 const CellConstants& k, Matrix& stress, Lanes mode_force[4][3]) {
+  Lanes s[3][3], energy = {};
+  forces_by_mode(k, drawn.p, s);
+  for (int m = 0; m < 3; ++m) {
+    Lanes r[3];
+    multiply(g.cofactor, s[m], r);
+    for (int i = 0; i < 3; ++i) {
+      energy += drawn.p[m][i] * s[m][i];
+      mode_force[m][i] = k.hourglass[m] * u[i].q[m] + r[i];
+      for (int j = 0; j < 3; ++j) stress.at[i][j] -= r[i] * drawn.p[m][j];
+    }
+  }
+  energy *= 0.5;
+  for (int i = 0; i < 3; ++i) {
+    mode_force[3][i] = k.hourglass[3] * u[i].q[3];
+    for (int j = 0; j < 3; ++j) stress.at[i][j] += energy * g.cofactor.at[i][j];
+  }
+}
+
 FLEXEL_INLINE Gradient gradient_of(const Modes modes[3], const CellConstants& k, const Lanes& fill,
                                    Sums& sums) {
   Matrix h;
@@ -78,9 +136,30 @@ FLEXEL_INLINE void add_swelling(const Gradient& g, const Matrix& rate, const Cel
     for (int j = 0; j < 3; ++j) stress.at[i][j] += pressure * g.cofactor.at[i][j];
 }
 
-// Adds the viscous stress [Pa] to `stress`; sets `spin_free`, the forces of the hourglass modes [N].
-FLEXEL_INLINE void add_damping(const Gradient& g, const Modes u[3], const Modes v[3], const CellConstants& k,
-                               Matrix& stress, Lanes spin_free[4][3]) {
+// Adds the viscous stress of the hourglass rates [Pa]; sets the forces of their modes [Pa/m]. `rate`: dF/dt.
+FLEXEL_INLINE void add_hourglass_damping(const Drawn& drawn, const Modes v[3], const Matrix& rate,
+                                         const CellConstants& k, Matrix& stress, Lanes mode_force[4][3]) {
+  Lanes moved[4][3], changed[3][3], s[3][3];  // q', dp/dt
+  for (int m = 0; m < 4; ++m) {
+    multiply(rate, drawn.p[m], moved[m]);
+    for (int i = 0; i < 3; ++i) moved[m][i] = v[i].q[m] - moved[m][i];
+    if (m < 3) multiply_transposed(drawn.inverse_transpose, moved[m], changed[m]);
+  }
+  forces_by_mode(k, changed, s);
+  for (int m = 0; m < 4; ++m) {
+    Lanes r[3] = {};
+    if (m < 3) multiply(drawn.inverse_transpose, s[m], r);
+    for (int i = 0; i < 3; ++i) {
+      const Lanes force = k.damping * (k.hourglass[m] * moved[m][i] + r[i]);
+      mode_force[m][i] = force;
+      for (int j = 0; j < 3; ++j) stress.at[i][j] -= force * drawn.p[m][j];
+    }
+  }
+}
+
+// Adds the viscous stress [Pa] to `stress`; sets the viscous forces of the hourglass modes [Pa/m].
+FLEXEL_INLINE void add_damping(const Gradient& g, const Drawn& drawn, const Modes v[3],
+                               const CellConstants& k, Matrix& stress, Lanes mode_force[4][3]) {
   Matrix rate;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) rate.at[i][j] = v[i].d[j] * (0.25 / k.spacing[j]);
@@ -104,43 +183,18 @@ FLEXEL_INLINE void add_damping(const Gradient& g, const Modes u[3], const Modes 
     for (int j = 0; j < 3; ++j)
       stress.at[i][j] +=
           s.at[i][j] + (g.h.at[i][0] * s.at[0][j] + g.h.at[i][1] * s.at[1][j] + g.h.at[i][2] * s.at[2][j]);
-  // spin w of L = dF/dt F^-1, F^-1 = (cof F)^T / J
-  Matrix l;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      l.at[i][j] = g.inverse * (rate.at[i][0] * g.cofactor.at[j][0] + rate.at[i][1] * g.cofactor.at[j][1] +
-                                rate.at[i][2] * g.cofactor.at[j][2]);
-  const Lanes w[3] = {0.5 * (l.at[2][1] - l.at[1][2]), 0.5 * (l.at[0][2] - l.at[2][0]),
-                      0.5 * (l.at[1][0] - l.at[0][1])};
-  Lanes torque[3] = {};  // sum_m tau c_m q_m x q'_m
-  for (int m = 0; m < 4; ++m) {
-    const Lanes q[3] = {0.125 * u[0].q[m], 0.125 * u[1].q[m], 0.125 * u[2].q[m]};
-    const double viscosity = k.damping * k.hourglass[m];
-    for (int i = 0; i < 3; ++i) {
-      const int a = (i + 1) % 3, b = (i + 2) % 3;
-      spin_free[m][i] = viscosity * (0.125 * v[i].q[m] - (w[a] * q[b] - w[b] * q[a]));
-    }
-    for (int i = 0; i < 3; ++i) {
-      const int a = (i + 1) % 3, b = (i + 2) % 3;
-      torque[i] += q[a] * spin_free[m][b] - q[b] * spin_free[m][a];
-    }
-  }
-  // its reaction through w: P += G F^-T / V, G_ij = 1/2 eps_kij t_k
-  const Lanes share = (0.5 / k.volume) * g.inverse;
-  for (int j = 0; j < 3; ++j) {
-    const Lanes x = g.cofactor.at[0][j], y = g.cofactor.at[1][j], z = g.cofactor.at[2][j];
-    stress.at[0][j] += share * (torque[2] * y - torque[1] * z);
-    stress.at[1][j] += share * (torque[0] * z - torque[2] * x);
-    stress.at[2][j] += share * (torque[1] * x - torque[0] * y);
-  }
+  add_hourglass_damping(drawn, v, rate, k, stress, mode_force);
 }
 
 FLEXEL_INLINE void forces_of(const Matrix& stress, const Lanes mode_force[4][3], const Lanes& fill,
                              const CellConstants& k, Corners& force) {
+  Lanes along[3];
+  for (int j = 0; j < 3; ++j) along[j] = (-0.25 * k.volume / k.spacing[j]) * fill;
+  const Lanes whole = -k.volume * fill;
   for (int i = 0; i < 3; ++i) {
     Modes t;
-    for (int j = 0; j < 3; ++j) t.d[j] = -fill * stress.at[i][j] * (0.25 * k.volume / k.spacing[j]);
-    for (int m = 0; m < 4; ++m) t.q[m] = -fill * mode_force[m][i] * 0.125;
+    for (int j = 0; j < 3; ++j) t.d[j] = along[j] * stress.at[i][j];
+    for (int m = 0; m < 4; ++m) t.q[m] = whole * mode_force[m][i];
     transform_back(t, i, force);
   }
 }

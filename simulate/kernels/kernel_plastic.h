@@ -12,9 +12,9 @@
 // J is then over Jp, in everything but F^-T, and energies and stresses are per volume of the rest shape, Jp
 // to one of the voxel.
 //
-// The hourglass displacements q_m have a plastic part F Q_m, which turns with the cell: energy 1/2 c_m
-// |e_m|^2, e_m = q_m - F Q_m. Their stress at a cell's faces, beside the mean one, S^2 = 6 mu / V sum_m c_m
-// |e_m|^2, is bounded as the bending moment of a rectangular section under tension is (Prager and Hodge 1951,
+// The hourglass displacements q_m have a plastic part F Q_m, which turns with the cell: energy U_h of e_m = q_m - F Q_m
+// and p_m = F^-1 e_m. Their stress at a cell's faces, beside the mean one, S^2 = 12 mu U_h / V, is bounded as the bending
+// moment of a rectangular section under tension is (Prager and Hodge 1951,
 // M / Mp = 1 - (N / Np)^2, Mp = 3/2 My), but not below 1/20 of the yield stress, which keeps cells that yield
 // from swinging in these modes:
 //     S / S_y <= max(3/2 (1 - |s|^2 / S_y^2), 1/20),   S_y = sqrt(2/3) sigma_y(a)
@@ -79,12 +79,13 @@ FLEXEL_INLINE Lanes determinant(const Symmetric& s) {
 
 // The state of the material in a block.
 struct Elastic {
-  Symmetric strain;        // b - I
-  Lanes trace;             // tr(b - I)
-  Lanes change;            // J - 1, J over that of the rest shape
-  Lanes log_volume;        // ln J
-  Lanes hourglass[4][3];   // e_m [m]
-  Lanes hourglass_square;  // sum_m c_m |e_m|^2 [J]
+  Symmetric strain;  // b - I
+  Lanes trace;       // tr(b - I)
+  Lanes change;      // J - 1, J over that of the rest shape
+  Lanes log_volume;  // ln J
+  // With plasticity, of sums: 8 e_m [m], p_m of the first three [m], their forces [Pa/m] and of these the part by K.
+  Lanes hourglass[4][3], drawn[3][3], mode_force[4][3], by_mode[3][3];
+  Lanes hourglass_square;  // 2 U_h / V [Pa]
 };
 
 FLEXEL_INLINE Symmetric deviator(const Symmetric& s, const Lanes& trace) {
@@ -93,26 +94,21 @@ FLEXEL_INLINE Symmetric deviator(const Symmetric& s, const Lanes& trace) {
   return d;
 }
 
-FLEXEL_INLINE Lanes sum_of_squares(const Elastic& now, const CellConstants& k) {
+// 2 U_h / V, which is of second order.
+FLEXEL_INLINE Lanes hourglass_square(const Modes u[3], const Lanes mode_force[4][3]) {
   Lanes sum = {};
-  for (int m = 0; m < 4; ++m) {
-    Lanes square = {};
-    for (int i = 0; i < 3; ++i) square += now.hourglass[m][i] * now.hourglass[m][i];
-    sum += k.hourglass[m] * square;
-  }
+  for (int m = 0; m < 4; ++m)
+    for (int i = 0; i < 3; ++i) sum += u[i].q[m] * mode_force[m][i];
   return sum;
 }
 
-FLEXEL_INLINE Elastic elastic_state(const Gradient& g, const Modes u[3], const Lanes& change,
-                                    const Lanes& log_volume, const CellConstants& k) {
+// Without the hourglass displacements.
+FLEXEL_INLINE Elastic elastic_state(const Gradient& g, const Lanes& change, const Lanes& log_volume) {
   Elastic now;
   now.change = change;
   now.log_volume = log_volume;
   now.strain = left_strain(g.h);
   now.trace = now.strain.at[0] + now.strain.at[1] + now.strain.at[2];
-  for (int m = 0; m < 4; ++m)
-    for (int i = 0; i < 3; ++i) now.hourglass[m][i] = 0.125 * u[i].q[m];
-  now.hourglass_square = sum_of_squares(now, k);
   return now;
 }
 
@@ -127,6 +123,34 @@ FLEXEL_INLINE Matrix inverse_of(const Gradient& g) {
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) r.at[i][j] = g.inverse * g.cofactor.at[j][i];
   return r;
+}
+
+// e_m = q_m - F Q_m and what follows from them.
+FLEXEL_INLINE void set_hourglass(const Gradient& g, const Modes u[3], const CellConstants& k,
+                                 const PlasticBlock& memory, Elastic& now) {
+  const Matrix f = deformation(g), back = inverse_of(g);
+  for (int m = 0; m < 4; ++m) {
+    const Lanes q[3] = {8 * load(memory.hourglass[m][0]), 8 * load(memory.hourglass[m][1]),
+                        8 * load(memory.hourglass[m][2])};
+    multiply(f, q, now.hourglass[m]);
+    for (int i = 0; i < 3; ++i) now.hourglass[m][i] = u[i].q[m] - now.hourglass[m][i];
+    if (m < 3) multiply(back, now.hourglass[m], now.drawn[m]);
+  }
+  Lanes s[3][3];
+  forces_by_mode(k, now.drawn, s);
+  for (int m = 0; m < 4; ++m) {
+    if (m < 3) {
+      for (int i = 0; i < 3; ++i) s[m][i] = (1 + now.change) * s[m][i];
+      multiply_transposed(back, s[m], now.by_mode[m]);
+    }
+    for (int i = 0; i < 3; ++i) {
+      now.mode_force[m][i] = k.hourglass[m] * now.hourglass[m][i];
+      if (m < 3) now.mode_force[m][i] += now.by_mode[m][i];
+    }
+  }
+  now.hourglass_square = Lanes{};
+  for (int m = 0; m < 4; ++m)
+    for (int i = 0; i < 3; ++i) now.hourglass_square += now.hourglass[m][i] * now.mode_force[m][i];
 }
 
 // What the flow of the mean stress leaves for the hourglass modes: |s| and its bound [Pa].
@@ -178,20 +202,25 @@ FLEXEL_INLINE Yielding flow(const Gradient& g, const CellConstants& k, const Lan
 
 FLEXEL_INLINE void flow_of_hourglass(const Gradient& g, const CellConstants& k, const Lanes& fill,
                                      const Yielding& y, Elastic& now, PlasticBlock& memory, Sums& sums) {
-  const Lanes stress = square_root(6 * k.mu / k.volume * now.hourglass_square);
+  const Lanes stress = square_root(6 * k.mu * now.hourglass_square);
   const Lanes ratio = y.stress / y.bound;
   const Lanes bending = 1.5 * (1 - ratio * ratio);
   const Lanes bound = y.bound * (bending > kHourglassFloor ? bending : Lanes{} + kHourglassFloor);
   const LaneMask yields = (stress > bound) & (fill > 0);
   if (!any(yields)) return;
   const Lanes keep = yields ? bound / stress : Lanes{} + 1;
-  sums.plastic_work += fill * now.hourglass_square * (1 - keep) * keep;
+  sums.plastic_work += fill * k.volume * now.hourglass_square * (1 - keep) * keep;
   const Matrix back = inverse_of(g);
   for (int m = 0; m < 4; ++m) {
     Lanes taken[3];
     for (int i = 0; i < 3; ++i) {
-      taken[i] = (1 - keep) * now.hourglass[m][i];
+      taken[i] = 0.125 * (1 - keep) * now.hourglass[m][i];
       now.hourglass[m][i] = keep * now.hourglass[m][i];
+      now.mode_force[m][i] = keep * now.mode_force[m][i];
+      if (m < 3) {
+        now.drawn[m][i] = keep * now.drawn[m][i];
+        now.by_mode[m][i] = keep * now.by_mode[m][i];
+      }
     }
     for (int i = 0; i < 3; ++i) {
       const Lanes moved = back.at[i][0] * taken[0] + back.at[i][1] * taken[1] + back.at[i][2] * taken[2];
@@ -205,40 +234,39 @@ FLEXEL_INLINE void flow_of_hourglass(const Gradient& g, const CellConstants& k, 
 FLEXEL_INLINE Elastic plastic_state(const Gradient& g, const Modes u[3], const CellConstants& k,
                                     const Lanes& fill, PlasticBlock& memory, Sums& sums) {
   const Lanes rest = load(memory.volume), change = (g.change - rest) / (1 + rest);
-  Elastic now = elastic_state(g, u, change, log1p(change), k);
+  Elastic now = elastic_state(g, change, log1p(change));
   Symmetric flowed;
   for (int i = 0; i < 6; ++i) flowed.at[i] = load(memory.flow[i]);
-  const Matrix f = deformation(g);
-  flowed = congruence(f, flowed);
+  flowed = congruence(deformation(g), flowed);
   for (int i = 0; i < 6; ++i) now.strain.at[i] += flowed.at[i];
   now.trace = now.strain.at[0] + now.strain.at[1] + now.strain.at[2];
-  for (int m = 0; m < 4; ++m) {
-    const Lanes q[3] = {load(memory.hourglass[m][0]), load(memory.hourglass[m][1]),
-                        load(memory.hourglass[m][2])};
-    for (int i = 0; i < 3; ++i)
-      now.hourglass[m][i] -= f.at[i][0] * q[0] + f.at[i][1] * q[1] + f.at[i][2] * q[2];
-  }
-  now.hourglass_square = sum_of_squares(now, k);
+  set_hourglass(g, u, k, memory, now);
   const Yielding y = flow(g, k, fill, now, memory, sums);
   flow_of_hourglass(g, k, fill, y, now, memory, sums);
   return now;
 }
 
-// First Piola-Kirchhoff stress of the mean and, through F Q_m, of the hourglass modes [Pa].
+// First Piola-Kirchhoff stress of the mean and, through F Q_m and F^-1 e_m, of the hourglass modes [Pa].
 FLEXEL_INLINE Matrix plastic_stress(const Gradient& g, const Elastic& now, const CellConstants& k,
                                     const PlasticBlock& memory) {
   const Lanes pressure = k.lambda * now.log_volume;
+  Lanes by_mode = {};  // energy by K over V
+  for (int m = 0; m < 3; ++m)
+    for (int i = 0; i < 3; ++i) by_mode += 0.5 * now.by_mode[m][i] * now.hourglass[m][i];
   Matrix p;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
-      Lanes sum = pressure * g.cofactor.at[i][j];
+      Lanes sum = (pressure + by_mode) * g.cofactor.at[i][j];
       for (int n = 0; n < 3; ++n) sum += k.mu * now.strain.at[kEntry[i][n]] * g.cofactor.at[n][j];
       p.at[i][j] = sum * g.inverse;
     }
   for (int m = 0; m < 4; ++m)
     for (int j = 0; j < 3; ++j) {
-      const Lanes q = (k.hourglass[m] / k.volume) * load(memory.hourglass[m][j]);
-      for (int i = 0; i < 3; ++i) p.at[i][j] -= now.hourglass[m][i] * q;
+      const Lanes q = 8 * load(memory.hourglass[m][j]);
+      for (int i = 0; i < 3; ++i) {
+        p.at[i][j] -= now.mode_force[m][i] * q;
+        if (m < 3) p.at[i][j] -= now.by_mode[m][i] * now.drawn[m][j];
+      }
     }
   return p;
 }
@@ -246,8 +274,7 @@ FLEXEL_INLINE Matrix plastic_stress(const Gradient& g, const Elastic& now, const
 // Elastic energy [J] of whole cells.
 FLEXEL_INLINE Lanes elastic_energy(const Elastic& now, const CellConstants& k) {
   return k.volume * (0.5 * k.mu * (now.trace - 2 * now.log_volume) +
-                     0.5 * k.lambda * now.log_volume * now.log_volume) +
-         0.5 * now.hourglass_square;
+                     0.5 * k.lambda * now.log_volume * now.log_volume + 0.5 * now.hourglass_square);
 }
 
 // Lanes that break.

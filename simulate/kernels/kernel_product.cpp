@@ -28,13 +28,18 @@ FLEXEL_INLINE Matrix stress_at_rest(const Matrix& h, const CellConstants& k) {
   return p;
 }
 
-FLEXEL_INLINE Matrix stress_deformed(const Matrix& h, const double* tangent, const CellConstants& k) {
+FLEXEL_INLINE Matrix load_matrix(const double* from) {
   Matrix g;
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) g.at[i][j] = load(tangent + kLanes * static_cast<std::size_t>(3 * i + j));
-  const Lanes coupling = load(tangent + kLanes * 9);
+    for (int j = 0; j < 3; ++j) g.at[i][j] = load(from + kLanes * static_cast<std::size_t>(3 * i + j));
+  return g;
+}
+
+FLEXEL_INLINE Matrix stress_deformed(const Matrix& h, const Matrix& g, const double* tangent,
+                                     const CellConstants& k) {
+  const Lanes coupling = load(tangent);
   Lanes added[6];
-  for (std::size_t c = 0; c < 6; ++c) added[c] = load(tangent + kLanes * (10 + c));
+  for (std::size_t c = 0; c < 6; ++c) added[c] = load(tangent + kLanes * (1 + c));
   constexpr int of[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
   Matrix turned;  // c H^T G
   Lanes change = {};
@@ -67,6 +72,52 @@ FLEXEL_INLINE Matrix stress_by_moduli(const Matrix& h, const double* tangent) {
   return p;
 }
 
+// Adds what the hourglass energy by K changes: of s = J K p, forces r_m = G s_m, stress U G - sum r_m p_m^T with U =
+// 1/2 p s,
+//     dp_m = G^T (dQ_m - H p_m),   dr_m = G (J K dp - H^T r)_m + (G : H) r_m,   dU = (G : H) U + s dp.
+FLEXEL_INLINE void add_by_mode(const Matrix& h, const Matrix& g, const double* tangent, const Modes u[3],
+                               const CellConstants& k, Matrix& stress, Lanes mode_force[4][3]) {
+  const Lanes jacobian = load(tangent + kLanes * 18), share = jacobian * load(tangent + kLanes * 19);
+  Lanes p[3][3], s[3][3], r[3][3], dp[3][3], ds[3][3], swells = {}, energy = {}, change = {};
+  for (int m = 0; m < 3; ++m)
+    for (int i = 0; i < 3; ++i)
+      p[m][i] = 8 * load(tangent + kLanes * static_cast<std::size_t>(9 + 3 * m + i));
+  forces_by_mode(k, p, s);
+  for (int m = 0; m < 3; ++m) {
+    Lanes moved[3];
+    multiply(h, p[m], moved);
+    for (int i = 0; i < 3; ++i) moved[i] = u[i].q[m] - moved[i];
+    multiply_transposed(g, moved, dp[m]);
+    for (int i = 0; i < 3; ++i) {
+      s[m][i] = share * s[m][i];
+      swells += g.at[m][i] * h.at[m][i];
+      energy += 0.5 * p[m][i] * s[m][i];
+      change += s[m][i] * dp[m][i];
+    }
+    multiply(g, s[m], r[m]);
+  }
+  change += swells * energy;
+  forces_by_mode(k, dp, ds);
+  for (int m = 0; m < 3; ++m) {
+    Lanes turned[3], dr[3];
+    multiply_transposed(h, r[m], turned);
+    for (int i = 0; i < 3; ++i) turned[i] = jacobian * ds[m][i] - turned[i];
+    multiply(g, turned, dr);
+    for (int i = 0; i < 3; ++i) {
+      dr[i] += swells * r[m][i];
+      mode_force[m][i] += dr[i];
+      for (int j = 0; j < 3; ++j) stress.at[i][j] -= dr[i] * p[m][j] + r[m][i] * dp[m][j];
+    }
+  }
+  for (int i = 0; i < 3; ++i) {  // dG = -G H^T G
+    Lanes across[3], row[3];
+    for (int j = 0; j < 3; ++j)
+      across[j] = g.at[i][0] * h.at[j][0] + g.at[i][1] * h.at[j][1] + g.at[i][2] * h.at[j][2];
+    multiply_transposed(g, across, row);
+    for (int j = 0; j < 3; ++j) stress.at[i][j] += change * g.at[i][j] - energy * row[j];
+  }
+}
+
 template <TangentForm form>
 FLEXEL_INLINE void add_block(const ChunkView& chunk, const CellBlock& block, const double* tangent,
                              const Scratch& scratch) {
@@ -78,16 +129,28 @@ FLEXEL_INLINE void add_block(const ChunkView& chunk, const CellBlock& block, con
   Matrix h, stress;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) h.at[i][j] = u[i].d[j] * (0.25 / k.spacing[j]);
+  Lanes mode_force[4][3];
+  [[maybe_unused]] Lanes q[3][3];
+  for (int m = 0; m < 4; ++m)
+    for (int i = 0; i < 3; ++i) {
+      if (m < 3) q[m][i] = u[i].q[m];
+      mode_force[m][i] = k.hourglass[m] * u[i].q[m];
+    }
   if constexpr (form == TangentForm::at_rest) {
     stress = stress_at_rest(h, k);
-  } else if constexpr (form == TangentForm::deformed) {
-    stress = stress_deformed(h, tangent, k);
+    Lanes s[3][3];
+    forces_by_mode(k, q, s);
+    for (int m = 0; m < 3; ++m)
+      for (int i = 0; i < 3; ++i) mode_force[m][i] += s[m][i];
   } else {
-    stress = stress_by_moduli(h, tangent);
+    const Matrix g = load_matrix(tangent);
+    const double* mean = tangent + kLanes * kHourglassColumns;
+    if constexpr (form == TangentForm::deformed)
+      stress = stress_deformed(h, g, mean, k);
+    else
+      stress = stress_by_moduli(h, mean);
+    add_by_mode(h, g, tangent, u, k, stress, mode_force);
   }
-  Lanes mode_force[4][3];
-  for (int m = 0; m < 4; ++m)
-    for (int i = 0; i < 3; ++i) mode_force[m][i] = (0.125 * k.hourglass[m]) * u[i].q[m];
   forces_of(stress, mode_force, -load(block.fill), k, corners);  // K u: against the forces
   add_to_corners(chunk, block, corners, scratch.column + kForce);
 }

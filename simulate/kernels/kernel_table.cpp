@@ -5,15 +5,17 @@
 // Model `cells` (simulate/models/cell_model.h) in the lattice frame. With the sums D_j = sum_a s_aj u_a and Q_m =
 // sum_a s_ma u_a of an 8-point Walsh-Hadamard transform,
 //     H_.j = D_j / (4 h_j),  q_m = Q_m / 8,
-//     f_a = -fill { V/4 sum_j P_.j s_aj / h_j + 1/8 sum_m c_m s_ma q_m }:  the same transform backwards.
+//     f_a = -fill V { 1/4 sum_j P_.j s_aj / h_j + sum_m s_ma f_m }:  the same transform backwards,
+// with the sums Q and constants over 64 V f_m = c_m Q_m + r_m, r_m = cof F (K p)_m, p_m = F^-1 Q_m, and P has
+// 1/2 p K p cof F - sum_m r_m p_m^T of the latter.
 // P is that of the part's law (simulate/laws).
 //
 // Damping with time tau is the power of the rate of strain, A = sym(F^T dF/dt) without its trace, and of that of the
 // volume: P_v = tau (2 mu F dev A + K dJ/dt cof F), K = lambda + 2 mu / 3. (The trace of A is not 0 at constant volume
 // where F is far from a rotation, and K may be thousands of mu.) Of orthotropic laws P_v = tau F C A, C the moduli at
-// rest. For the hourglass modes it is that of their rate as seen by an observer that turns with the cell, q' = dq/dt
-// - w x q, w the spin of dF/dt F^-1. The dissipation does not change under any rigid motion of the
-// velocities, so linear and angular momentum are kept exactly.
+// rest. For the hourglass modes it is that of their rate as seen by an observer that is deformed with the cell, q' =
+// dq/dt - dF/dt F^-1 q = F dp/dt: tau (c_m |q'|^2 + dp/dt K dp/dt). The dissipation does not change under any rigid motion of
+// the velocities, so linear and angular momentum are kept exactly.
 //
 // Model `springs` (simulate/models/spring_model.h): F = -k (d - l) along each spring, Jansson and Vergeest eqs. 15,
 // 16, 18; d - l = (d^2 - l^2) / (d + l) with d^2 - l^2 from the displacements, without cancellation. Cell by
@@ -47,6 +49,8 @@ struct CellsModel {
     read_corners(chunk, block, scratch.column + kDisplacement, corners);
     for (int i = 0; i < 3; ++i) u[i] = transform(corners, i);
     const Gradient g = gradient_of(u, k, fill, sums);
+    constexpr int drawn_modes = has.damping != Damping::none ? 4 : 3;  // the last one by its rate alone
+    [[maybe_unused]] const Drawn drawn = drawn_back<drawn_modes>(g, u);
     Matrix stress;
     Lanes mode_force[4][3];
     [[maybe_unused]] Elastic now;
@@ -54,16 +58,16 @@ struct CellsModel {
     bool elastic = true;
     if constexpr (has.plasticity) elastic = !neo_hooke;  // other laws do not flow
     if (elastic) {
-      stress = elastic_stress<has>(g, u, k, fill, now, sums);
-      for (int m = 0; m < 4; ++m)
-        for (int i = 0; i < 3; ++i) mode_force[m][i] = (0.125 * k.hourglass[m]) * u[i].q[m];
+      stress = elastic_stress<has>(g, k, fill, now, sums);
+      add_hourglass(g, drawn, u, k, stress, mode_force);
+      if constexpr (has.fracture || has.plasticity) now.hourglass_square = hourglass_square(u, mode_force);
     } else if constexpr (has.plasticity) {
       PlasticBlock& memory = chunk.plastic[number];
       matter = fill * (1 + load(memory.volume));
       now = plastic_state(g, u, k, matter, memory, sums);
       stress = plastic_stress(g, now, k, memory);
       for (int m = 0; m < 4; ++m)
-        for (int i = 0; i < 3; ++i) mode_force[m][i] = k.hourglass[m] * now.hourglass[m][i];
+        for (int i = 0; i < 3; ++i) mode_force[m][i] = now.mode_force[m][i];
     }
     if constexpr (has.damping != Damping::none) {
       read_corners(chunk, block, scratch.column + kVelocity, corners);
@@ -89,16 +93,16 @@ struct CellsModel {
     }
     if constexpr (has.damping != Damping::none) {
       Matrix viscous = {};
-      Lanes spin_free[4][3];
-      add_damping(g, u, v, k, viscous, spin_free);
+      Lanes viscous_force[4][3];
+      add_damping(g, drawn, v, k, viscous, viscous_force);
       if constexpr (has.damping == Damping::book) {
-        forces_of(viscous, spin_free, matter, k, corners);
+        forces_of(viscous, viscous_force, matter, k, corners);
         add_to_corners(chunk, block, corners, scratch.column + kDampingForce);
       }
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) stress.at[i][j] += viscous.at[i][j];
       for (int m = 0; m < 4; ++m)
-        for (int i = 0; i < 3; ++i) mode_force[m][i] += spin_free[m][i];
+        for (int i = 0; i < 3; ++i) mode_force[m][i] += viscous_force[m][i];
     }
     forces_of(stress, mode_force, matter, k, corners);
     add_to_corners(chunk, block, corners, scratch.column + kForce);
@@ -108,11 +112,11 @@ struct CellsModel {
   // First Piola-Kirchhoff stress [Pa]; `now` is set where fracture or the books need it. Chains that are drawn beyond
   // their length end the run as a cell does that folds.
   template <Composition has>
-  FLEXEL_INLINE static Matrix elastic_stress(const Gradient& g, const Modes u[3], const CellConstants& k,
-                                             const Lanes& fill, [[maybe_unused]] Elastic& now, Sums& sums) {
+  FLEXEL_INLINE static Matrix elastic_stress(const Gradient& g, const CellConstants& k, const Lanes& fill,
+                                             [[maybe_unused]] Elastic& now, Sums& sums) {
     if (k.law.name == LawName::neo_hooke) {
       const Lanes log_volume = log1p(g.change);
-      if constexpr (has.fracture) now = elastic_state(g, u, g.change, log_volume, k);
+      if constexpr (has.fracture) now = elastic_state(g, g.change, log_volume);
       return laws::neo_hooke_stress(g, log_volume, k.mu, k.lambda);
     }
     const Gradient at = g;
@@ -121,7 +125,7 @@ struct CellsModel {
     stress_of_law(k.law, at, made, reserve);
     reserve = fill > 0 ? reserve : Lanes{} + __builtin_huge_val();
     sums.smallest_jacobian = reserve >= sums.smallest_jacobian ? sums.smallest_jacobian : reserve;
-    if constexpr (has.fracture || has.plasticity) now = elastic_state(g, u, g.change, Lanes{}, k);
+    if constexpr (has.fracture || has.plasticity) now = elastic_state(g, g.change, Lanes{});
     return made;
   }
 
@@ -130,7 +134,7 @@ struct CellsModel {
     const Matrix h = g.h;
     Lanes density;
     energy_of_law(k.law, h, density);
-    return k.volume * density + 0.5 * now.hourglass_square;
+    return k.volume * (density + 0.5 * now.hourglass_square);
   }
 
   // Of cells that break with the force f [J]: their energy half a step ago, U + dt/2 f . v, which is what the

@@ -44,9 +44,12 @@ FLEXEL_INLINE Kinematics<T> kinematics(const Matrix<T>& h, const Checked& checke
   g.jacobian = 1 + g.change;
   g.inverse = 1 / g.jacobian;
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) g.less_one.at[i][j] = second.at[i][j] - h.at[j][i] + (i == j ? g.trace : T{});
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) g.cofactor.at[i][j] = g.less_one.at[i][j] + (i == j ? 1.0 : 0.0);
+    for (int j = 0; j < 3; ++j) {
+      g.less_one.at[i][j] = second.at[i][j] - h.at[j][i];
+      if (i == j) g.less_one.at[i][j] += g.trace;
+      g.cofactor.at[i][j] = g.less_one.at[i][j];
+      if (i == j) g.cofactor.at[i][j] += 1.0;
+    }
   return g;
 }
 

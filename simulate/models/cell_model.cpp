@@ -10,15 +10,6 @@
 namespace flexel::simulate {
 namespace {
 
-std::array<Vec3, 4> hourglass_displacements(const CellKind& kind, const CellVectors& u) {
-  std::array<Vec3, 4> q;
-  for (std::size_t mode = 0; mode < 4; ++mode) {
-    q[mode] = -kind.mode_offset[mode];
-    for (std::size_t a = 0; a < 8; ++a) q[mode] += kind.mode[mode][a] * u[a];
-  }
-  return q;
-}
-
 double hourglass_coefficient(const CellKind& kind, std::size_t a, std::size_t b) {
   double sum = 0;
   for (std::size_t mode = 0; mode < 4; ++mode)
@@ -33,24 +24,66 @@ void set_diagonal(CellKind& kind) {
                                  hourglass_coefficient(kind, a, b);
 }
 
-// c_m of a material with other moduli along each axis of the lattice: Young's without contraction, and the
-// shear moduli, both from the compliance along those axes.
-std::array<double, 4> hourglass_of(const Law& law, const Vec3& curvature, double volume) {
-  const Mat6 s = inverse_6(moduli_at_rest(law));
-  Vec3 bend, twist_xyz, slide;  // E_j / (1 + nu), mean shear beside axis j; G of xy, yz, zx
-  for (int k = 0; k < 3; ++k) slide[k] = 1 / s(3 + k, 3 + k);
-  for (int j = 0; j < 3; ++j) {
-    const double contraction = 0.5 * (s(j, (j + 1) % 3) + s(j, (j + 2) % 3));
-    bend[j] = 1 / std::max(s(j, j) - contraction, 0.5 * s(j, j));
-    twist_xyz[j] = 0.5 * (slide[j] + slide[(j + 2) % 3]);
-  }
-  // mode along axes j and k, its third axis l: bending moves along j and k, twisting along l
-  const auto pair = [&](int j, int k, double beside_j, double beside_k) {
-    return 4.0 / 9 * volume * ((bend[j] + beside_j) * curvature[j] + (bend[k] + beside_k) * curvature[k]);
+// Young's moduli of plane stress along axes k and l: E'_k, E'_kl, E'_l. `s`: compliance.
+Vec3 plane_moduli(const Mat6& s, int k, int l) {
+  return Vec3(s(l, l), -s(k, l), s(k, k)) / (s(k, k) * s(l, l) - s(k, l) * s(k, l));
+}
+
+// 2 mu of other directions than those of an isotropic law: Young's modulus along j without contraction.
+double modulus_along(const Mat6& s, int j) {
+  const double contraction = 0.5 * (s(j, (j + 1) % 3) + s(j, (j + 2) % 3));
+  return 1 / std::max(s(j, j) - contraction, 0.5 * s(j, j));
+}
+
+// K and the c_m together. Mode m has the axes m, m + 1 and twists along m + 2.
+Mat9 twisting_and_bending(const Mat6& s, const Vec3& h) {
+  Mat9 k = Mat9::Zero();
+  const double scale = 4.0 / 3 * h.prod();
+  const auto at = [](int mode, int component) { return 3 * mode + component; };
+  const auto add = [&](int row, int column, double value) {
+    k(row, column) += scale * value;
+    if (row != column) k(column, row) += scale * value;
   };
-  const double xy = slide[0], yz = slide[1], zx = slide[2];
-  return {pair(0, 1, zx, yz), pair(1, 2, xy, zx), pair(2, 0, yz, xy),
-          8.0 / 27 * volume * (bend + twist_xyz).dot(curvature)};
+  for (int i = 0; i < 3; ++i) {  // the shear of axes i and j, linear along l
+    const int j = (i + 1) % 3, l = (i + 2) % 3;
+    const double shear = 1 / s(3 + i, 3 + i);
+    const int one = at(j, i), other = at(l, j);  // modes jl and li
+    add(one, one, shear / (h[j] * h[j]));
+    add(one, other, shear / (h[j] * h[i]));
+    add(other, other, shear / (h[i] * h[i]));
+  }
+  for (int j = 0; j < 3; ++j) {
+    const int a = (j + 1) % 3, b = (j + 2) % 3;
+    const Vec3 moduli = plane_moduli(s, a, b);
+    const int one = at(j, a), other = at(b, b);  // modes ja and bj
+    add(one, one, moduli[0] / (h[a] * h[a]));
+    add(one, other, moduli[1] / (h[a] * h[b]));
+    add(other, other, moduli[2] / (h[b] * h[b]));
+  }
+  return k;
+}
+
+// `law`: in the lattice's axes.
+void set_hourglass(CellKind& kind, const Law& law, const Vec3& h) {
+  const Mat6 compliance = inverse_6(moduli_at_rest(law));
+  const Vec3 curvature = h.cwiseProduct(h).cwiseInverse();
+  kind.by_mode = twisting_and_bending(compliance, h);
+  Eigen::Matrix<double, 9, 1> root;  // of c_m / theta
+  for (int m = 0; m < 3; ++m)
+    root.segment<3>(3 * m).setConstant(
+        std::sqrt(4.0 / 3 * kind.volume * (curvature[m] + curvature[(m + 1) % 3])));
+  const Mat9 scaled = root.cwiseInverse().asDiagonal() * kind.by_mode * root.cwiseInverse().asDiagonal();
+  const double theta = Eigen::SelfAdjointEigenSolver<Mat9>(scaled, Eigen::EigenvaluesOnly).eigenvalues()[0];
+  for (std::size_t m = 0; m < 3; ++m) {
+    const auto first = static_cast<Eigen::Index>(3 * m);
+    kind.hourglass[m] = theta * root[first] * root[first];
+    kind.by_mode.diagonal().segment<3>(first).array() -= kind.hourglass[m];
+  }
+  kind.by_mode_largest =
+      Eigen::SelfAdjointEigenSolver<Mat9>(kind.by_mode, Eigen::EigenvaluesOnly).eigenvalues()[8];
+  kind.hourglass[3] = 0;
+  for (int j = 0; j < 3; ++j)
+    kind.hourglass[3] += 4.0 / 27 * kind.volume * modulus_along(compliance, j) * curvature[j];
 }
 
 CellKind kind_of(const Lattice& lattice, const Mat3& axes, const Law& law, const Law& in_lattice) {
@@ -64,12 +97,8 @@ CellKind kind_of(const Lattice& lattice, const Mat3& axes, const Law& law, const
     const Vec3 sign((a & 1) ? 1 : -1, (a & 2) ? 1 : -1, (a & 4) ? 1 : -1);
     kind.gradient[static_cast<std::size_t>(a)] = axes * sign.cwiseQuotient(h);
   }
-  const Vec3 curvature = h.cwiseProduct(h).cwiseInverse();
-  const double scale = kind.mu * kind.volume;
-  kind.hourglass = {4.0 / 3 * scale * (curvature.x() + curvature.y()),
-                    4.0 / 3 * scale * (curvature.y() + curvature.z()),
-                    4.0 / 3 * scale * (curvature.z() + curvature.x()), 8.0 / 9 * scale * curvature.sum()};
-  if (law.name == LawName::orthotropic) kind.hourglass = hourglass_of(in_lattice, curvature, kind.volume);
+  kind.to_lattice = axes.transpose();
+  set_hourglass(kind, in_lattice, h);
   for (int mode = 0; mode < 4; ++mode)
     for (int corner = 0; corner < 8; ++corner)
       kind.mode[static_cast<std::size_t>(mode)][static_cast<std::size_t>(corner)] =
@@ -97,6 +126,9 @@ CellKind with_rest_shape(const CellKind& kind, const Mat3& change, double volume
   own.volume *= volume;
   own.offset = change;
   own.mode_offset = hourglass;
+  own.by_mode *= volume;
+  own.by_mode_largest *= volume;
+  own.to_lattice += kind.to_lattice * change;
   for (std::size_t m = 0; m < 4; ++m) {
     own.hourglass[m] *= volume;
     for (std::size_t a = 0; a < 8; ++a) own.mode[m][a] -= kind.gradient[a].dot(hourglass[m]) / 4;
@@ -104,6 +136,15 @@ CellKind with_rest_shape(const CellKind& kind, const Mat3& change, double volume
   for (Vec3& gradient : own.gradient) gradient += (change * gradient).eval();
   set_diagonal(own);
   return own;
+}
+
+std::array<Vec3, 4> hourglass_displacements(const CellKind& kind, const CellVectors& u) {
+  std::array<Vec3, 4> q;
+  for (std::size_t mode = 0; mode < 4; ++mode) {
+    q[mode] = -kind.mode_offset[mode];
+    for (std::size_t a = 0; a < 8; ++a) q[mode] += kind.mode[mode][a] * u[a];
+  }
+  return q;
 }
 
 Mat3 displacement_gradient(const CellKind& kind, const CellVectors& u) {
@@ -151,22 +192,45 @@ Mat3 predicted_stress(const CellKind& kind, const Mat3& h, const Mat3& change) {
   return second + (Mat3::Identity() + h).inverse() * (first - change * second);
 }
 
+HourglassForces hourglass_forces(const CellKind& kind, const Mat3& h, const std::array<Vec3, 4>& q) {
+  HourglassForces made;
+  const Mat3 inverse = (Mat3::Identity() + h).inverse();
+  made.pull = kind.to_lattice * inverse;
+  made.inverse_transpose = inverse.transpose();
+  Eigen::Matrix<double, 9, 1> p;
+  for (int m = 0; m < 3; ++m) {
+    const Vec3& each = q[static_cast<std::size_t>(m)];
+    made.arm[static_cast<std::size_t>(m)] = inverse * each;
+    p.segment<3>(3 * m) = made.pull * each;
+  }
+  const Eigen::Matrix<double, 9, 1> s = (1 + volume_change(h)) * (kind.by_mode * p);
+  for (int m = 0; m < 3; ++m)
+    made.force[static_cast<std::size_t>(m)] = made.pull.transpose() * s.segment<3>(3 * m);
+  made.energy = 0.5 * p.dot(s);
+  return made;
+}
+
 double cell_energy(const CellKind& kind, const CellVectors& u) {
   const Mat3 h = displacement_gradient(kind, u);
   if (!(volume_change(h) > -1)) return std::numeric_limits<double>::infinity();
   double energy = kind.volume * energy_density(kind, h);
   const std::array<Vec3, 4> q = hourglass_displacements(kind, u);
   for (std::size_t mode = 0; mode < 4; ++mode) energy += 0.5 * kind.hourglass[mode] * q[mode].squaredNorm();
-  return energy;
+  return energy + hourglass_forces(kind, h, q).energy;
 }
 
 CellVectors cell_forces(const CellKind& kind, const CellVectors& u) {
-  const Mat3 first_piola = (0.25 * kind.volume) * stress(kind, displacement_gradient(kind, u));
+  const Mat3 h = displacement_gradient(kind, u);
+  const Mat3 first_piola = (0.25 * kind.volume) * stress(kind, h);
   const std::array<Vec3, 4> q = hourglass_displacements(kind, u);
+  const HourglassForces by_mode = hourglass_forces(kind, h, q);
   CellVectors forces;
+  const Mat3 mean = first_piola + (0.25 * by_mode.energy) * by_mode.inverse_transpose;
   for (std::size_t a = 0; a < 8; ++a) {
-    Vec3 force = first_piola * kind.gradient[a];
+    Vec3 force = mean * kind.gradient[a];
     for (std::size_t m = 0; m < 4; ++m) force += (kind.hourglass[m] * kind.mode[m][a]) * q[m];
+    for (std::size_t m = 0; m < 3; ++m)
+      force += (kind.mode[m][a] - 0.25 * kind.gradient[a].dot(by_mode.arm[m])) * by_mode.force[m];
     forces[a] = -force;
   }
   return forces;
@@ -202,18 +266,6 @@ Mat9 positive_part(const Mat9& moduli) {
 
 Mat9 projected_elasticity(const CellKind& kind, const CellTangent& tangent) {
   return positive_part(elasticity(kind, tangent));
-}
-
-std::array<Block, 64> blocks_at_rest(const CellKind& kind) {
-  std::array<Block, 64> blocks;
-  if (kind.law.name == LawName::neo_hooke) {
-    const CellTangent rest = {};
-    for (std::size_t ab = 0; ab < 64; ++ab) blocks[ab] = tangent_block(kind, rest, ab / 8, ab % 8);
-    return blocks;
-  }
-  const Mat9 moduli = elasticity(kind, Mat3(Mat3::Zero()));
-  for (std::size_t ab = 0; ab < 64; ++ab) blocks[ab] = projected_block(kind, moduli, ab / 8, ab % 8);
-  return blocks;
 }
 
 Block projected_block(const CellKind& kind, const Mat9& moduli, std::size_t a, std::size_t b) {

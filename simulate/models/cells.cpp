@@ -23,6 +23,10 @@ void add_cell_row(const CellKind& kind, const PreparedCell& cell, double fill, s
                   const std::array<std::uint16_t, 64>& slot, Block* row) {
   if (cell.folding)
     for (std::size_t b = 0; b < 8; ++b) row[slot[8 * a + b]] += fill * (*cell.folding)[8 * a + b];
+  std::array<Block, 8> own;
+  own.fill(Block::Zero());
+  add_hourglass_row(kind, cell.hourglass, fill, a, 0, 8, own.data());
+  for (std::size_t b = 0; b < 8; ++b) row[slot[8 * a + b]] += own[b];
   if (cell.moduli) {
     for (std::size_t b = 0; b < 8; ++b)
       row[slot[8 * a + b]] += fill * projected_block(kind, *cell.moduli, a, b);
@@ -179,8 +183,8 @@ void Cells::set_stiffness(const State& state, const TangentOptions& tangent, Blo
         const CellVectors u = corner_values(cell, state.displacement);
         with_kind(cell, state, [&](const auto& kind) {
           if constexpr (std::is_same_v<std::decay_t<decltype(kind)>, CellKind>)
-            prepared[c] = prepare_cell(kind, displacement_gradient(kind, u), tangent.project,
-                                       tangent.stress ? &(*tangent.stress)[c] : nullptr);
+            prepared[c] =
+                prepare_cell(kind, u, tangent.project, tangent.stress ? &(*tangent.stress)[c] : nullptr);
         });
         if (!may_fold(cell, u)) return;
         if (const auto folding = fold_tangent(kinds_[part_[c]], thresholds(cell, state), u, tangent.project))

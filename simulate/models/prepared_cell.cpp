@@ -25,8 +25,68 @@ Mat9 prepare_moduli(const CellKind& kind, const Mat3& gradient, bool project, co
   return moduli;
 }
 
-PreparedCell prepare_cell(const CellKind& kind, const Mat3& gradient, bool project, const Mat3* stress) {
+HourglassTangent hourglass_tangent(const CellKind& kind, const CellVectors& u, bool project) {
+  const Mat3 gradient = displacement_gradient(kind, u);
+  const HourglassForces forces = hourglass_forces(kind, gradient, hourglass_displacements(kind, u));
+  HourglassTangent tangent{forces.inverse_transpose,
+                           1 + volume_change(gradient),
+                           forces.pull,
+                           forces.arm,
+                           forces.force,
+                           forces.energy};
+  if (project) tangent.force.fill(Vec3::Zero());
+  if (project) tangent.energy = 0;
+  return tangent;
+}
+
+void add_hourglass_row(const CellKind& kind, const HourglassTangent& tangent, double factor, std::size_t a,
+                       std::size_t begin, std::size_t end, Block* out) {
+  std::array<std::array<double, 8>, 3> weight;  // v_ma
+  for (std::size_t m = 0; m < 3; ++m)
+    for (std::size_t b = 0; b < 8; ++b)
+      weight[m][b] = kind.mode[m][b] - 0.25 * kind.gradient[b].dot(tangent.arm[m]);
+  std::array<Mat3, 3> row;
+  for (int n = 0; n < 3; ++n) {
+    Mat3 sum = Mat3::Zero();
+    for (int m = 0; m < 3; ++m)
+      sum += weight[static_cast<std::size_t>(m)][a] * kind.by_mode.block<3, 3>(3 * m, 3 * n);
+    row[static_cast<std::size_t>(n)] =
+        (factor * tangent.jacobian) * tangent.pull.transpose() * sum * tangent.pull;
+  }
+  const auto force_at = [&](std::size_t b) -> Vec3 {
+    return weight[0][b] * tangent.force[0] + weight[1][b] * tangent.force[1] +
+           weight[2][b] * tangent.force[2];
+  };
+  const Vec3 w_a = tangent.inverse_transpose * (0.25 * factor * kind.gradient[a]);
+  // What w_b meets on its right, times the factor: r_a and the energy's share.
+  const Vec3 with = 0.25 * (factor * force_at(a) + tangent.energy * w_a);
+  for (std::size_t b = begin; b < end; ++b) {
+    const Vec3 w_b = tangent.inverse_transpose * kind.gradient[b], r_b = force_at(b);
+    for (std::size_t n = 0; n < 3; ++n) out[b] += weight[n][b] * row[n];
+    out[b] += with * w_b.transpose() - w_b * with.transpose() + w_a * r_b.transpose() - r_b * w_a.transpose();
+  }
+}
+
+std::array<Block, 64> blocks_at_rest(const CellKind& kind) {
+  std::array<Block, 64> blocks;
+  HourglassTangent rest;
+  rest.pull = kind.to_lattice;
+  rest.arm.fill(Vec3::Zero());
+  rest.force.fill(Vec3::Zero());
+  const bool neo_hooke = kind.law.name == LawName::neo_hooke;
+  const Mat9 moduli = neo_hooke ? Mat9(Mat9::Zero()) : elasticity(kind, Mat3(Mat3::Zero()));
+  for (std::size_t a = 0; a < 8; ++a) {
+    for (std::size_t b = 0; b < 8; ++b)
+      blocks[8 * a + b] = neo_hooke ? tangent_block(kind, {}, a, b) : projected_block(kind, moduli, a, b);
+    add_hourglass_row(kind, rest, 1, a, 0, 8, &blocks[8 * a]);
+  }
+  return blocks;
+}
+
+PreparedCell prepare_cell(const CellKind& kind, const CellVectors& u, bool project, const Mat3* stress) {
   PreparedCell cell;
+  const Mat3 gradient = displacement_gradient(kind, u);
+  cell.hourglass = hourglass_tangent(kind, u, project);
   if (kind.law.name != LawName::neo_hooke) {
     cell.moduli = std::make_unique<Mat9>(prepare_moduli(kind, gradient, project, stress));
     return cell;

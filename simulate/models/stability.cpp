@@ -11,6 +11,7 @@
 #include "base/parallel.h"
 #include "simulate/models/cells.h"
 #include "simulate/models/corner_barrier.h"
+#include "simulate/models/prepared_cell.h"
 #include "simulate/models/rest_shape.h"
 
 namespace flexel::simulate {
@@ -49,12 +50,54 @@ bool is_springs(const Problem& problem, std::size_t part) {
   return problem.models.size() > part && problem.models[part] == Model::springs;
 }
 
+// Of the hourglass modes of a deformed cell: c_m, K / s_min^2, s_min the least stretch, J, and sqrt(sum_m |F^-1 q_m|^2) over
+// the least spacing h.
+struct HourglassGrowth {
+  double free = 0, by_mode = 0;  // N/m
+  double jacobian = 1, drawn = 0;
+};
+
+HourglassGrowth hourglass_growth(const CellKind& kind, const Vec3& spacing, const CellVectors& u,
+                                 const Mat3& gradient) {
+  const Mat3 f = Mat3::Identity() + gradient;
+  Eigen::SelfAdjointEigenSolver<Mat3> eigen;
+  eigen.computeDirect(f.transpose() * f, Eigen::EigenvaluesOnly);
+  const Mat3 inverse = f.inverse();
+  HourglassGrowth growth;
+  double square = 0;
+  for (const Vec3& each : hourglass_displacements(kind, u)) square += (inverse * each).squaredNorm();
+  growth.free = *std::max_element(kind.hourglass.begin(), kind.hourglass.end());
+  growth.by_mode = kind.by_mode_largest / std::max(eigen.eigenvalues()[0], 1e-12);
+  growth.jacobian = 1 + volume_change(gradient);
+  growth.drawn = std::sqrt(square) / spacing.minCoeff();
+  return growth;
+}
+
+// Of the energy over the largest eigenvalue at rest `largest` [N/m], at most: alone, and what the coupling of q_m with F adds.
+// With k = J K / s_min^2 the second derivative of J/2 p K p is at most k times
+//     (|dq| + |dF| |p|)^2 + 2 (1 + sqrt 3) |p| |dF| (|dq| + |dF| |p|) + 2 |p|^2 |dF|^2,
+// and of displacements of size 1 |dq|^2 is at most 1/8, |dF|^2 1 / (2 h^2), |dq| |dF| 1 / (8 h).
+double alone(const HourglassGrowth& growth, double largest) {
+  return (growth.free + growth.jacobian * growth.by_mode) / 8 / largest;
+}
+double coupling(const HourglassGrowth& growth, double largest) {
+  return growth.jacobian * growth.by_mode * growth.drawn * (1 + 4.3 * growth.drawn) / largest;
+}
+
+// Of a whole cell [N/m].
+double largest_at_rest(const Problem& problem, std::size_t part) {
+  const Lattice& lattice = problem.body.parts[part].lattice;
+  const Material& material = problem.materials[part];
+  const CornersMatrix k = is_springs(problem, part) ? springs_stiffness(spring_kind(lattice, material))
+                                                    : cells_stiffness(cell_kind(lattice, material));
+  return eigenvalues_symmetric(k)[23];
+}
+
 // With plastic flow, of neo-Hooke alone, its stretch counts too (simulate/laws/neo_hooke_scalar.h). Other laws
 // bound by the largest modulus, exact for cubes: a cell's largest eigenvalue is that modulus times the gradients'
 // squares, which spacings differ in.
-double cell_stiffening(const CellKind& kind, const Vec3& spacing, const CellVectors& u, bool plastic,
+double mean_stiffening(const CellKind& kind, const Vec3& spacing, const Mat3& gradient, bool plastic,
                        const std::optional<CellKind>& shaped) {
-  const Mat3 gradient = displacement_gradient(kind, u);
   if (kind.law.name != LawName::neo_hooke) {
     const double ratio = spacing.maxCoeff() / spacing.minCoeff();
     return ratio * ratio * stiffening(kind.law, gradient);
@@ -68,6 +111,16 @@ double cell_stiffening(const CellKind& kind, const Vec3& spacing, const CellVect
     flow.volume = shaped->volume / kind.volume;
   }
   return neo_hooke::stiffening(kind.law, gradient, flow);
+}
+
+double cell_stiffening(const CellKind& kind, const Vec3& spacing, const CellVectors& u, bool plastic,
+                       const std::optional<CellKind>& shaped, double largest) {
+  const Mat3 gradient = displacement_gradient(kind, u);
+  const double volume = shaped ? shaped->volume / kind.volume : 1;
+  const HourglassGrowth hourglass = hourglass_growth(kind, spacing, u, gradient);
+  return std::max(mean_stiffening(kind, spacing, gradient, plastic, shaped),
+                  volume * alone(hourglass, largest)) +
+         volume * coupling(hourglass, largest);
 }
 
 // k (1 + extension) at most; compression turns the cross stiffness k (1 - l/d) negative, which slows.
@@ -109,21 +162,17 @@ double rate_growth(const CellKind& kind, const Mat3& f, const Polar& of) {
 }
 
 // Over the largest eigenvalue at rest, `largest` [N/m]. The square root of a sum of dissipations is at most the sum
-// of theirs: that at rest, grown by the stretch, and that by the spin of hourglass displacements. |dF/dt|^2 is at
+// of theirs: that at rest, grown by the stretch, and that by what dF/dt does to hourglass displacements. |dF/dt|^2 is at
 // most 1 / (2 h^2) of the velocities' squares; unequal spacings bound as in cell_stiffening().
 double damping_growth(const CellKind& kind, const Vec3& spacing, const CellVectors& u, double largest) {
   const Mat3 f = Mat3::Identity() + displacement_gradient(kind, u);
   if (f == Mat3::Identity()) return 1;
-  const Polar of = polar(f);
-  double turned = 0;  // N/m
-  for (int mode = 0; mode < 4; ++mode) {
-    Vec3 q = Vec3::Zero();
-    for (std::size_t a = 0; a < 8; ++a) q += hourglass_sign(mode, static_cast<int>(a)) * u[a] / 8;
-    turned += kind.hourglass[static_cast<std::size_t>(mode)] * q.squaredNorm();
-  }
-  turned /= 2 * std::pow(of.shortest * spacing.minCoeff(), 2);
+  const HourglassGrowth hourglass = hourglass_growth(kind, spacing, u, f - Mat3::Identity());
+  const double stiffness = hourglass.free + hourglass.by_mode;
+  const double turned = stiffness * hourglass.drawn * hourglass.drawn / 2;  // N/m
   const double ratio = spacing.maxCoeff() / spacing.minCoeff();
-  return std::pow(ratio * rate_growth(kind, f, of) + std::sqrt(turned / largest), 2);
+  const double still = std::max(ratio * rate_growth(kind, f, polar(f)), std::sqrt(stiffness / 8 / largest));
+  return std::pow(still + std::sqrt(turned / largest), 2);
 }
 
 // Likewise: springs turn against the cell. At most Gershgorin's bound, each row's sum.
@@ -197,11 +246,8 @@ std::vector<double> cell_frequencies(const Problem& problem) {
       result.push_back(0);
       continue;
     }
-    const CornersMatrix k = is_springs(problem, p)
-                                ? springs_stiffness(spring_kind(part.lattice, problem.materials[p]))
-                                : cells_stiffness(cell_kind(part.lattice, problem.materials[p]));
     const double corner_mass = problem.materials[p].density * part.lattice.spacing.prod() / 8;
-    result.push_back(eigenvalues_symmetric(k)[23] / corner_mass);
+    result.push_back(largest_at_rest(problem, p) / corner_mass);
   }
   return result;
 }
@@ -229,14 +275,15 @@ std::vector<double> stiffening(const Problem& problem, const std::vector<Vec3>& 
     const bool by_springs = is_springs(problem, p);
     const bool breaks = plan.broken_springs || (!plan.fracture.empty() && plan.fracture[p].any());
     return
-        [&part, &shapes, plastic, by_springs, breaks, cells = cell_kind(part.lattice, problem.materials[p]),
+        [&part, &shapes, plastic, by_springs, breaks, largest = largest_at_rest(problem, p),
+         cells = cell_kind(part.lattice, problem.materials[p]),
          springs = spring_kind(part.lattice, problem.materials[p])](std::uint32_t c, const CellVectors& u) {
           if (by_springs && !breaks && !(1 + volume_change(displacement_gradient(cells, u)) > 0))
             return std::numeric_limits<double>::infinity();
           if (by_springs)
             return springs_stiffening(shapes.any() ? shapes.of(springs, c).value_or(springs) : springs, u);
           const std::optional<CellKind> shaped = shapes.any() ? shapes.of(cells, part, c) : std::nullopt;
-          return cell_stiffening(cells, part.lattice.spacing, u, plastic, shaped) +
+          return cell_stiffening(cells, part.lattice.spacing, u, plastic, shaped, largest) +
                  fold_stiffening(cells, fold_thresholds(cells, shaped), u);
         };
   });

@@ -34,7 +34,7 @@ namespace flexel::simulate {
                                              const KernelEffects& plan);
 
 // Likewise of the internal damping over tau (simulate/implicit/damping_matrix.h): at least 1. With A = sym(F^T dF/dt),
-// |A| <= |F| |dF/dt|, |dJ/dt| <= |cof F| |dF/dt|; hourglass displacements q feel the spin too, |q'| <= |dq/dt| + |F^-1| |dF/dt| |q|.
+// |A| <= |F| |dF/dt|, |dJ/dt| <= |cof F| |dF/dt|; hourglass displacements q feel dF/dt too, |q'| <= |dq/dt| + |dF/dt| |F^-1 q|.
 // `frequencies`: cell_frequencies(problem).
 [[nodiscard]] std::vector<double> damping_growth(const Problem& problem,
                                                  const std::vector<Vec3>& displacement,

@@ -5,9 +5,15 @@
 
 #include <Eigen/Dense>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <random>
 
+#include "base/math/dense.h"
 #include "base/math/eigenvalues.h"
+#include "simulate/laws/elasticity.h"
+#include "simulate/models/prepared_cell.h"
+#include "simulate/models/stability.h"
+#include "tests/simulate/stepped.h"
 
 namespace flexel::simulate {
 namespace {
@@ -106,23 +112,6 @@ TEST(CellModel, AffineFieldHasTheContinuumsEnergyAtAnySpacing) {
   }
 }
 
-TEST(CellModel, ForcesAreTheEnergysDerivative) {
-  const CellKind kind = cell_kind(turned_lattice(), rubbery(0.3));
-  Random random;
-  for (int round = 0; round < 20; ++round) {
-    const CellVectors u = random.displacement(0.015);
-    const CellVectors forces = cell_forces(kind, u);
-    for (int a = 0; a < 8; ++a)
-      for (int axis = 0; axis < 3; ++axis) {
-        CellVectors up = u, down = u;
-        up[a][axis] += 1e-6;
-        down[a][axis] -= 1e-6;
-        const double difference = (cell_energy(kind, up) - cell_energy(kind, down)) / 2e-6;
-        EXPECT_NEAR(-forces[a][axis], difference, 1e-5 * (std::abs(difference) + 100));
-      }
-  }
-}
-
 TEST(CellModel, NoNetForceAndTorque) {
   const Lattice lattice = turned_lattice();
   const CellKind kind = cell_kind(lattice, rubbery(0.4));
@@ -141,26 +130,203 @@ TEST(CellModel, NoNetForceAndTorque) {
   EXPECT_LT(torque.norm(), 1e-12 * scale);
 }
 
-TEST(CellModel, StiffnessIsTheForcesDerivativeAndSymmetric) {
-  const CellKind kind = cell_kind(turned_lattice(), rubbery(0.3));
+// Of its own at rest, and of one that flowed.
+std::array<CellKind, 2> kinds_of(double poisson) {
+  const CellKind kind = cell_kind(turned_lattice(), rubbery(poisson));
+  Mat3 change;
+  change << -0.1, 0.03, 0.02, 0.03, 0.15, -0.05, 0.02, -0.05, 0.05;
+  std::array<Vec3, 4> flowed;
+  for (int m = 0; m < 4; ++m) flowed[static_cast<std::size_t>(m)] = Vec3(0.004, -0.002 * m, 0.003);
+  return {kind, with_rest_shape(kind, change, 1.1, flowed)};
+}
+
+TEST(CellModel, ForcesAreTheEnergysDerivative) {
   Random random;
-  for (int round = 0; round < 10; ++round) {
-    const CellVectors u = random.displacement(0.015);
-    const CellTangent tangent = cell_tangent(displacement_gradient(kind, u));
-    for (std::size_t b = 0; b < 8; ++b)
-      for (int axis = 0; axis < 3; ++axis) {
-        CellVectors up = u, down = u;
-        up[b][axis] += 1e-6;
-        down[b][axis] -= 1e-6;
-        const CellVectors high = cell_forces(kind, up), low = cell_forces(kind, down);
-        for (std::size_t a = 0; a < 8; ++a) {
-          const Vec3 difference = -(high[a] - low[a]) / 2e-6;
-          const Block block = tangent_block(kind, tangent, a, b);
-          EXPECT_LT((block.col(axis) - difference).norm(), 1e-5 * (difference.norm() + 1e4));
-          EXPECT_LT((block.transpose() - tangent_block(kind, tangent, b, a)).norm(),
-                    1e-9 * (block.norm() + 1));
+  for (const CellKind& kind : kinds_of(0.3))
+    for (int round = 0; round < 20; ++round) {
+      const CellVectors u = random.displacement(0.015);
+      const CellVectors forces = cell_forces(kind, u);
+      for (std::size_t a = 0; a < 8; ++a)
+        for (int axis = 0; axis < 3; ++axis) {
+          CellVectors up = u, down = u;
+          up[a][axis] += 1e-6;
+          down[a][axis] -= 1e-6;
+          const double difference = (cell_energy(kind, up) - cell_energy(kind, down)) / 2e-6;
+          EXPECT_NEAR(-forces[a][axis], difference, 1e-5 * (std::abs(difference) + 100));
         }
+    }
+}
+
+std::array<Block, 64> tangent_of(const CellKind& kind, const CellVectors& u) {
+  const CellTangent tangent = cell_tangent(displacement_gradient(kind, u));
+  const HourglassTangent hourglass = hourglass_tangent(kind, u, false);
+  std::array<Block, 64> blocks;
+  for (std::size_t a = 0; a < 8; ++a) {
+    for (std::size_t b = 0; b < 8; ++b) blocks[8 * a + b] = tangent_block(kind, tangent, a, b);
+    add_hourglass_row(kind, hourglass, 1, a, 0, 8, &blocks[8 * a]);
+  }
+  return blocks;
+}
+
+TEST(CellModel, StiffnessIsTheForcesDerivativeAndSymmetric) {
+  Random random;
+  for (const CellKind& kind : kinds_of(0.3))
+    for (int round = 0; round < 10; ++round) {
+      const CellVectors u = random.displacement(0.015);
+      const std::array<Block, 64> blocks = tangent_of(kind, u);
+      for (std::size_t b = 0; b < 8; ++b)
+        for (int axis = 0; axis < 3; ++axis) {
+          CellVectors up = u, down = u;
+          up[b][axis] += 1e-6;
+          down[b][axis] -= 1e-6;
+          const CellVectors high = cell_forces(kind, up), low = cell_forces(kind, down);
+          for (std::size_t a = 0; a < 8; ++a) {
+            const Vec3 difference = -(high[a] - low[a]) / 2e-6;
+            const Block& block = blocks[8 * a + b];
+            EXPECT_LT((block.col(axis) - difference).norm(), 1e-5 * (difference.norm() + 1e4));
+            EXPECT_LT((block.transpose() - blocks[8 * b + a]).norm(), 1e-9 * (block.norm() + 1));
+          }
+        }
+    }
+}
+
+TEST(CellModel, BlocksAtRestAreTheTangentThere) {
+  const CellKind kind = kinds_of(0.3)[0];
+  CellVectors rest;
+  rest.fill(Vec3::Zero());
+  const std::array<Block, 64> at_rest = blocks_at_rest(kind), tangent = tangent_of(kind, rest);
+  for (std::size_t k = 0; k < 64; ++k) EXPECT_LT((at_rest[k] - tangent[k]).norm(), 1e-12 * tangent[0].norm());
+}
+
+// Strains curvature x_k of the three axes.
+CellVectors bent(const Vec3& spacing, const Vec3& curvature, int k) {
+  const int i = (k + 1) % 3, j = (k + 2) % 3;
+  CellVectors u;
+  for (int a = 0; a < 8; ++a) {
+    const Vec3 x = spacing.cwiseProduct(Vec3((a & 1) - 0.5, (a >> 1 & 1) - 0.5, (a >> 2) - 0.5));
+    Vec3& to = u[static_cast<std::size_t>(a)];
+    to[i] = curvature[i] * x[i] * x[k];
+    to[j] = curvature[j] * x[j] * x[k];
+    to[k] = 0.5 * (curvature[k] * x[k] * x[k] - curvature[i] * x[i] * x[i] - curvature[j] * x[j] * x[j]);
+  }
+  return u;
+}
+
+Material wood() {
+  Material material{"w", 0, 0, 430, ""};
+  material.law = LawName::orthotropic;
+  material.youngs = Vec3(11e9, 0.9e9, 0.5e9);
+  material.poissons = Vec3(0.37, 0.42, 0.47);
+  material.shears = Vec3(0.75e9, 0.06e9, 0.7e9);  // of yz, zx, xy where no key says otherwise
+  return material;
+}
+
+// Bending about any axis without stress beside it, plates and wood as well: the matter's energy, whatever the spacing.
+TEST(CellModel, PureBendingHasTheMattersEnergy) {
+  Lattice lattice;
+  for (const Vec3& h : {Vec3(0.1, 0.1, 0.1), Vec3(0.1, 0.3, 0.04)})
+    for (const Material& material : {rubbery(0), rubbery(0.3), rubbery(0.49), rubbery(-0.5), wood()}) {
+      lattice.spacing = h;
+      const CellKind kind = cell_kind(lattice, material);
+      const Mat6 compliance = moduli_at_rest(kind.law).inverse();
+      for (int k = 0; k < 3; ++k)
+        for (const Vec3& pull : {Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(1, 1, 0), Vec3(1, -2, 0)}) {
+          Vec3 stress = Vec3::Zero();  // Pa/m
+          stress[(k + 1) % 3] = pull[0];
+          stress[(k + 2) % 3] = pull[1];
+          const Vec3 curvature = compliance.topLeftCorner<3, 3>() * stress;
+          const double size = 1e-9 / curvature.norm();
+          const double expected = 0.5 * size * size * stress.dot(curvature) * kind.volume * h[k] * h[k] / 12;
+          EXPECT_NEAR(cell_energy(kind, bent(h, size * curvature, k)) / expected, 1, 1e-6)
+              << h << " " << material.poisson << " along " << k;
+        }
+    }
+}
+
+// A twisted bar, whose section stays plane, and a twisted plate.
+TEST(CellModel, PureTwistingHasTheMattersEnergy) {
+  Lattice lattice;
+  for (const Vec3& h : {Vec3(0.1, 0.1, 0.1), Vec3(0.1, 0.3, 0.04)})
+    for (const Material& material : {rubbery(0.3), rubbery(0.49), wood()}) {
+      lattice.spacing = h;
+      const CellKind kind = cell_kind(lattice, material);
+      const Mat6 moduli = moduli_at_rest(kind.law);
+      for (int i = 0; i < 3; ++i) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3;
+        const auto shear = [&](int axis) { return moduli(3 + axis, 3 + axis); };  // of axis and the next
+        CellVectors bar, plate;
+        for (int a = 0; a < 8; ++a) {
+          const Vec3 x = h.cwiseProduct(Vec3((a & 1) - 0.5, (a >> 1 & 1) - 0.5, (a >> 2) - 0.5));
+          Vec3 &of_bar = bar[static_cast<std::size_t>(a)], &of_plate = plate[static_cast<std::size_t>(a)];
+          of_bar[i] = 0;
+          of_bar[j] = -1e-9 * x[i] * x[k];
+          of_bar[k] = 1e-9 * x[i] * x[j];
+          of_plate[i] = -1e-9 * x[j] * x[k];
+          of_plate[j] = -1e-9 * x[i] * x[k];
+          of_plate[k] = 1e-9 * x[i] * x[j];
+        }
+        const double scale = 0.5e-18 * kind.volume / 12;
+        const double of_bar = scale * (shear(i) * h[k] * h[k] + shear(k) * h[j] * h[j]);
+        EXPECT_NEAR(cell_energy(kind, bar) / of_bar, 1, 1e-6) << h << " along " << i;
+        EXPECT_NEAR(cell_energy(kind, plate) / (scale * 4 * shear(i) * h[k] * h[k]), 1, 1e-6);
       }
+    }
+}
+
+// Turned by any rotation, and mirrored or permuted like the cube: the same energy.
+TEST(CellModel, EnergyIsThatOfTheShapeAlone) {
+  Random random;
+  for (const CellKind& kind : kinds_of(0.45)) {
+    const CellVectors u = random.displacement(0.02);
+    const Mat3 rotation = Eigen::AngleAxisd(2.3, Vec3(1, -2, 3).normalized()).toRotationMatrix();
+    const auto x = corners(turned_lattice());
+    CellVectors turned;
+    for (std::size_t a = 0; a < 8; ++a) turned[a] = rotation * (x[a] + u[a]) - x[a];
+    EXPECT_NEAR(cell_energy(kind, turned) / cell_energy(kind, u), 1, 1e-11);
+  }
+  Lattice lattice;
+  lattice.spacing.setConstant(0.1);
+  const CellKind cube = cell_kind(lattice, rubbery(0.3));
+  const CellVectors u = random.displacement(0.02);
+  for (int form = 0; form < 48; ++form) {
+    std::array<int, 3> axis{0, 1, 2};
+    for (int step = 0; step < form % 6; ++step) std::next_permutation(axis.begin(), axis.end());
+    CellVectors moved;
+    for (std::size_t a = 0; a < 8; ++a) {
+      std::size_t to = 0;
+      Vec3 value;
+      for (int c = 0; c < 3; ++c) {
+        const bool mirrored = form / 6 >> c & 1;
+        const bool high = (a >> axis[static_cast<std::size_t>(c)] & 1) != mirrored;
+        to |= std::size_t{high} << c;
+        value[c] = (mirrored ? -1 : 1) * u[a][axis[static_cast<std::size_t>(c)]];
+      }
+      moved[to] = value;
+    }
+    EXPECT_NEAR(cell_energy(cube, moved) / cell_energy(cube, u), 1, 1e-12) << form;
+  }
+}
+
+// Squeezed to a third or drawn out to three times, no hourglass mode is softer than c_m.
+TEST(CellModel, NoStretchMakesHourglassModesUnstable) {
+  for (const double poisson : {-0.5, 0.0, 0.3, 0.49}) {
+    Lattice lattice;
+    lattice.spacing = Vec3(0.1, 0.1, 0.06);
+    const CellKind kind = cell_kind(lattice, rubbery(poisson));
+    EXPECT_GT(*std::min_element(kind.hourglass.begin(), kind.hourglass.end()), 0);
+    for (const Vec3& stretch : {Vec3(1, 1, 0.34), Vec3(0.5, 0.5, 0.5), Vec3(3, 1, 1), Vec3(2, 2, 0.4)}) {
+      const CellVectors u =
+          affine_displacements(lattice, Mat3(stretch.asDiagonal()) - Mat3::Identity(), Vec3::Zero());
+      const Mat3 pull = hourglass_tangent(kind, u, false).pull;
+      Mat9 spread = Mat9::Zero(), free = Mat9::Zero();
+      for (int m = 0; m < 3; ++m) {
+        spread.block<3, 3>(3 * m, 3 * m) = pull;
+        free.diagonal().segment<3>(3 * m).setConstant(kind.hourglass[static_cast<std::size_t>(m)]);
+      }
+      const Mat9 added = spread.transpose() * kind.by_mode * spread;
+      const double least = Eigen::SelfAdjointEigenSolver<Mat9>(free + added).eigenvalues()[0];
+      EXPECT_GT(least, (1 - 1e-10) * free.diagonal().minCoeff()) << poisson << " " << stretch;
+    }
   }
 }
 
@@ -226,6 +392,44 @@ TEST(CellModel, InvertedCellHasInfiniteEnergy) {
   Mat3 mirror = Mat3::Zero();
   mirror(0, 0) = -2;
   EXPECT_TRUE(std::isinf(cell_energy(kind, affine_displacements(lattice, mirror, Vec3::Zero()))));
+}
+
+// The bound on the step: of cells squeezed and bent at random by half a spacing and more, as far as none folds.
+TEST(CellModel, StiffnessIsWithinTheBoundOfTheStep) {
+  Random random;
+  int seen = 0;
+  for (const Vec3& h : {Vec3(0.1, 0.1, 0.1), Vec3(0.1, 0.1, 0.04)})
+    for (const Material& material : {rubbery(0), rubbery(0.3), rubbery(0.49)}) {
+      testing::BoxOptions options;
+      options.cells = {1, 1, 1};
+      options.spacing = h;
+      const Body body = testing::box_body(options);
+      const CellKind kind = cell_kind(body.parts[0].lattice, material);
+      const auto largest = [](const std::array<Block, 64>& blocks) {
+        Eigen::Matrix<double, 24, 24> whole;
+        for (Eigen::Index a = 0; a < 8; ++a)
+          for (Eigen::Index b = 0; b < 8; ++b)
+            whole.block<3, 3>(3 * a, 3 * b) = blocks[static_cast<std::size_t>(8 * a + b)];
+        return eigenvalues_symmetric(whole)[23];
+      };
+      const double at_rest = largest(blocks_at_rest(kind));
+      for (int round = 0; round < 60; ++round) {
+        std::vector<Vec3> displacement;
+        const double squeeze = 0.5 * (round % 5) / 4;
+        for (const Vec3& x : body.rest)
+          displacement.push_back(Vec3(0, 0, -squeeze * x.z()) +
+                                 h.minCoeff() * 0.3 * random.displacement(1)[0]);
+        CellVectors u;
+        for (std::size_t a = 0; a < 8; ++a) u[a] = displacement[body.cell_elements[0][a]];
+        if (!(volume_change(displacement_gradient(kind, u)) > -0.9)) continue;
+        const Problem problem = testing::problem_of(body, material);
+        ++seen;
+        EXPECT_LE(largest(tangent_of(kind, u)),
+                  (1 + 1e-9) * at_rest * stiffening(problem, displacement, {{0}})[0])
+            << material.poisson << ", round " << round;
+      }
+    }
+  EXPECT_GT(seen, 200);
 }
 
 }  // namespace

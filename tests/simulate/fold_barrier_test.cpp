@@ -11,6 +11,7 @@
 #include "base/math/dense.h"
 #include "base/math/eigenvalues.h"
 #include "simulate/effects/damping.h"
+#include "simulate/models/prepared_cell.h"
 #include "simulate/stepping/explicit_barrier.h"
 #include "tests/simulate/stepped.h"
 #include "tests/simulate/timed_case.h"
@@ -91,10 +92,11 @@ TEST_P(FoldBarrier, ItsStiffnessIsWithinTheBound) {
   const CellVectors u = pushed(kind, GetParam(), 3);
   Matrix24 own, barrier, projected;
   const auto tangent = fold_tangent(kind, kPlain, u, false), positive = fold_tangent(kind, kPlain, u, true);
+  const std::array<Block, 64> at_rest = blocks_at_rest(kind);
   for (std::size_t a = 0; a < 8; ++a)
     for (std::size_t b = 0; b < 8; ++b) {
       const auto row = 3 * static_cast<Eigen::Index>(a), column = 3 * static_cast<Eigen::Index>(b);
-      own.block<3, 3>(row, column) = tangent_block(kind, cell_tangent(Mat3::Zero()), a, b);
+      own.block<3, 3>(row, column) = at_rest[8 * a + b];
       barrier.block<3, 3>(row, column) = (*tangent)[8 * a + b];
       projected.block<3, 3>(row, column) = (*positive)[8 * a + b];
     }
