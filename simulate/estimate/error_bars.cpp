@@ -22,8 +22,13 @@
 namespace flexel::simulate {
 namespace {
 
-constexpr double kThinWall = 2;       // cells
-constexpr double kThinShare = 0.2;    // of the matter
+constexpr double kThinWall = 2;     // cells
+constexpr double kThinShare = 0.2;  // of the matter
+// Two cells through a wall and one may agree by chance: a twisted bar is off by 16 % with either, by 8 % with three. So
+// the only difference leaves at least so much of the value, in walls under three cells and in others.
+constexpr double kFewCells = 3, kFewCellsLeave = 0.2, kOneDifferenceLeaves = 0.1;
+// Of the value, at least, where values do not close in evenly: they may agree by chance.
+constexpr double kUnevenLeaves = 3e-3;
 constexpr int kAddedIterations = 20;  // of Newton, to twice those of the fine run
 // Of the coarse runs: far below the differences between lattices.
 constexpr double kCoarseTolerance = 1e-6;
@@ -187,6 +192,19 @@ void hold_indentations(const Body& body, const Scene& scene, ErrorBars& errors) 
   }
 }
 
+// Its order is 2 and more inside the matter and 1 at clamped edges and notches, which count last.
+Bar of_quadratic(Bar bar, const Sequence& values) {
+  bar.half_width =
+      std::max(bar.half_width, std::abs(values.value[0] - values.value[1]) / (values.ratio[0] - 1));
+  return bar;
+}
+
+// So much of the value.
+Bar at_least(double share, Bar bar) {
+  bar.half_width = std::max(bar.half_width, share * std::abs(bar.extrapolated));
+  return bar;
+}
+
 std::string first_sentence(const std::string& text) {
   return text.substr(0, text.find(": add "));
 }
@@ -205,6 +223,7 @@ ErrorBars estimate_errors(const Body& body, const Scene& scene, const SimulateOp
   const auto began = std::chrono::steady_clock::now();
   ErrorBars errors;
   errors.cells.push_back(body.cell_count());
+  const bool quadratic = QuadraticField::is_in(body);
   CoarseRuns runs(body, scene, options, result, solve, progress);
   Body half, quarter;
   std::string reason;
@@ -214,9 +233,10 @@ ErrorBars estimate_errors(const Body& body, const Scene& scene, const SimulateOp
   }
   errors.cells.push_back(half.cell_count());
   bool wide = false;
+  double least = kUnevenLeaves;  // of the value, of bars without an order
   if (runs.add(half, quarter, reason)) {
     errors.cells.push_back(quarter.cell_count());
-    if (const std::optional<double> thin = thin_walls(body, kThinWall, QuadraticField::is_in(body))) {
+    if (const std::optional<double> thin = thin_walls(body, kThinWall, quadratic)) {
       wide = true;
       errors.note = fmt::format(
           "{:.0f} % of the matter lies in walls under 2 cells: the bars are three times the "
@@ -232,14 +252,14 @@ ErrorBars estimate_errors(const Body& body, const Scene& scene, const SimulateOp
         "a lattice four times as coarse is of no use ({}): the bars are three times the "
         "only difference",
         first_sentence(reason));
+    if (!quadratic) {
+      least = thin_walls(body, kFewCells, quadratic) ? kFewCellsLeave : kOneDifferenceLeaves;
+      errors.note += fmt::format(" and at least {:.0f} % of the value", 100 * least);
+    }
   }
   const auto bar = [&](const Sequence& values) {
-    Bar found = wide ? wide_bar(values) : richardson(values);
-    // Its order is 2 and more inside the matter and 1 at clamped edges and notches, which count last.
-    if (QuadraticField::is_in(body))
-      found.half_width =
-          std::max(found.half_width, std::abs(values.value[0] - values.value[1]) / (values.ratio[0] - 1));
-    return found;
+    const Bar found = wide ? wide_bar(values) : richardson(values);
+    return quadratic ? of_quadratic(found, values) : found.order ? found : at_least(least, found);
   };
   for (std::size_t p = 0; p <= result.probes.size(); ++p) {
     const Sequence values = runs.moved(p);
@@ -251,7 +271,7 @@ ErrorBars estimate_errors(const Body& body, const Scene& scene, const SimulateOp
   const Sequence energy = runs.energy();
   errors.bars.push_back({ErrorBar::Of::elastic_energy, 0, "", energy.value[0], bar(energy)});
   const Sequence stress = runs.stress();
-  if (QuadraticField::is_in(body) && stress.value[0] > 0)
+  if (quadratic && stress.value[0] > 0)
     errors.von_mises = {stress.value, field_stress_bar(stress, errors.cells.size(), result.stress->doubt,
                                                        !result.stress->beside.empty())};
   else if (!wide && stress.value[0] > 0)

@@ -66,8 +66,8 @@ def test_a_thin_lip_of_a_thick_block_gets_the_surer_model():
 
 
 def test_the_surer_model_is_asked_wherever_the_error_is_missed():
-    # One of 4 mm: `cells` is off by up to 18 %, of which a thousand cells of `quadratic` leave 10.
-    block_with_lip(4)
+    # One of 2.5 mm: `cells` is off by up to 18 %, of which a thousand cells of `quadratic` leave 3.
+    block_with_lip(2.5)
     options = ["lip.obj", "--material", "PLA", "--fix", "zmin", "--push", "xmax: 0 0 -1 N", "--accuracy"]
     found, said = deform([*options, "12%"])
     runs = found["accuracy"]["runs"]
@@ -187,9 +187,9 @@ def test_every_model_answers_in_six_lines():
 
 
 def test_a_guess_is_called_one():
-    """A plate two cells thick: its bar is nearly its value."""
-    write("plate.stl", binary_stl(box_triangles((30, 20, 0.6))))
-    _, said = deform(["plate.stl", "--material", "steel", "--fix", "xmin", "--push", "xmax: 0 0 -1 N", "--size", "0.3mm"])
+    """A lip of 3 mm that holds two and a half cells: its bar is nearly its value."""
+    block_with_lip(3)
+    _, said = deform(["lip.obj", "--material", "PLA", "--model", "cells", "--fix", "zmin", "--push", "xmax: 0 0 -1 N", "--size", "1.25mm"])
     answer = box(said)
     sure = answer["how sure"]
     expect("first guess" in answer["how far"] and sure.startswith("hardly"), said)

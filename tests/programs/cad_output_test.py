@@ -45,7 +45,12 @@ def faces(part):
     return [(int(number), float(area), (re.search(r'called "(.*)"', what) or [None, ""])[1]) for number, area, what in found]
 
 
+# What a mesh within a thousandth of the diagonal loses of walls of 6 mm that are bent.
+TESSELLATION = 3e-3
+
+
 def volume(part):
+    """mm^3, of the triangles of `flexel info`."""
     return float(re.search(r"volume +([\d,.]+) mm", info(part))[1].replace(",", ""))
 
 
@@ -85,7 +90,7 @@ def the_same_faces_come_back(said):
     expect([each[0::2] for each in before] == [each[0::2] for each in after], f"numbers and names: {before} {after}")
     report = json.loads(pathlib.Path("report.json").read_text())
     changed = volume("bent.step") / volume("bracket.step")
-    expect(abs(changed - report["volume_after"] / report["volume_before"]) < 1e-3, f"volume: {changed} {report}")
+    expect(abs(changed - report["volume_after"] / report["volume_before"]) < TESSELLATION, f"volume: {changed} {report}")
     expect(pathlib.Path("bent.step").read_text().count("AUTOMOTIVE_DESIGN") == pathlib.Path("bracket.step").read_text().count("AUTOMOTIVE_DESIGN"), "schema")
 
 
@@ -152,7 +157,7 @@ def test_one_run_tells_the_faces_it_wrote():
         expect(abs(file["deviation"] / metres - 1) < 0.01 and file["deviation_face"] == f"bracket/{line[4]}", f"{line} {file}")
         expect(file["faces_kept"] == int(line[1]) and file["deviation"] <= file["tolerance"] and file["valid"] and not file["missed"], f"{file}")
         expect(file["format"] == {".igs": "iges"}.get(suffix := pathlib.Path(file["file"]).suffix, suffix[1:]), f"{file}")
-        expect(abs(file["volume_after"] * 1e9 / volume(file["file"]) - 1) < 1e-3, f"{file}")
+        expect(abs(file["volume_after"] * 1e9 / volume(file["file"]) - 1) < TESSELLATION, f"{file}")
     expect(abs(volume("bent.brep") / volume("bent.step") - 1) < 1e-6, "the same solid")
     read = lambda name: pathlib.Path(name).read_bytes()
     expect(read("bent.step") == read("again.step"), "one format, one file")
@@ -184,7 +189,7 @@ def a_tolerance_is_kept_or_told():
 
 
 def a_folded_part_is_told_and_not_written_with_strict():
-    folded = ("flexel-map", "bent.vtu", "--scale", "-40", "--tolerance", "1e-3")
+    folded = ("flexel-map", "bent.vtu", "--scale", "-60", "--tolerance", "1e-3")
     said = expect_ok(run(*folded, "-o", "folded.step")).err
     expect("turns space inside out at bracket/" in said, said)
     expect_error(run(*folded, "-o", "bent.step", "--strict", "--report", "report.json"), "flexel-map", code=4)

@@ -157,7 +157,7 @@ TEST(Contact, APartTouchesItself) {
     StartingVelocity start;
     start.where = parse_where(
         "{ box = { min = [\"35 mm\", \"-1 mm\", \"29 mm\"], max = [\"1 m\", \"1 m\", \"1 m\"] } }", "test");
-    start.velocity = Vec3(0, 0, -5);
+    start.velocity = Vec3(0, 0, -4.5);
     scene.get<InitialVelocity>().velocities.push_back(start);
     for (const double z : {low, high}) {
       Probe probe;

@@ -181,6 +181,27 @@ TEST(ErrorBars, SayWhyThereAreNone) {
   EXPECT_THAT(coarse.error_bars.note, HasSubstr("four times as coarse"));
 }
 
+// By 16 % with two cells through it and with one.
+TEST(ErrorBars, OfABarTwistedWithTwoCellsThroughItAreWide) {
+  for (const int length : {8, 20}) {
+    Body bar = testing::box_body({.cells = {length, 2, 2}, .spacing = Vec3::Constant(0.25)});
+    Scene scene = testing::held_beam("cells");
+    Load twist = make_push(select_by_name("box/x1"), Vec3::Zero());
+    twist.force.reset();
+    twist.torque = Vec3(testing::kStudyForce, 0, 0);
+    scene.get<Loads>().loads.push_back(twist);
+    const SimulateResult result = testing::simulate_quietly(bar, scene);
+    const ErrorBar& energy = result.error_bars.bars.back();
+    // Saint-Venant's torsion constant of a square: 0.1406 a^4 (Timoshenko and Goodier 1970, section 109).
+    const double shear = testing::kStudyYoung / 2 / (1 + testing::kStudyPoisson);
+    const double long_bar =
+        0.5 * std::pow(testing::kStudyForce, 2) * 0.25 * length / (0.1406 * std::pow(0.5, 4) * shear);
+    EXPECT_LT(energy.value, 0.9 * long_bar);
+    EXPECT_LT(std::abs(energy.value - long_bar), energy.bar.half_width);
+    EXPECT_THAT(result.error_bars.note, HasSubstr("at least 20 % of the value"));
+  }
+}
+
 TEST(ErrorBars, AreLeftOutWhenNotAskedFor) {
   Body beam = testing::corner_beam(2);
   Scene scene = testing::held_beam("cells");

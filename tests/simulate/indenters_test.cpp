@@ -309,7 +309,7 @@ INSTANTIATE_TEST_SUITE_P(Indenters, SymmetricPush,
                          ::testing::Values(ball(Vec3(0.03, 0.03, 0.045), 0.015, Vec3(0, 0, -0.004)),
                                            ball(Vec3(0.03, 0.03, 0.045), 0.015, Vec3(0, 0, -0.004)) +
                                                "[parts.box]\nmodel = \"springs\"\n",
-                                           plate(Vec3(0.03, 0.03, 0.031), 0.014, Vec3(0, 0, -0.005))));
+                                           plate(Vec3(0.03, 0.03, 0.031), 0.014, Vec3(0, 0, -0.0048))));
 
 // A quarter of a block, six radii of contact wide and high. Its ground is at rest where a half space would have gone by
 // F (1 + nu) (3 - 2 nu) / (2 pi E H) under the ball (Boussinesq).
