@@ -1,5 +1,5 @@
 // What keeps the corners of a cell of model `cells` from folding through each other: its mean gradient does
-// not see them, and its hourglass connections, which are linear, do not stop them.
+// not see them, and its hourglass connections know no limit, so they do not stop them.
 //
 // J_c is the Jacobian of the trilinear map at corner c, det F_c of the three edges that meet there. Where it
 // falls below a tenth (of that of the rest shape, where the cell has one that is smaller), T, the corner has

@@ -50,38 +50,52 @@ bool is_springs(const Problem& problem, std::size_t part) {
   return problem.models.size() > part && problem.models[part] == Model::springs;
 }
 
-// Of the hourglass modes of a deformed cell: c_m, K / s_min^2, s_min the least stretch, J, and sqrt(sum_m |F^-1 q_m|^2) over
-// the least spacing h.
+// Of the hourglass modes of a deformed cell: c_m, K / s_min^2, s_min the least stretch, J, and over the least spacing h
+// sqrt(sum_m |F^-1 q_m|^2), or that of F^-1 e_m if it is more, and sqrt(sum_m |Q_m|^2) of a rest shape.
 struct HourglassGrowth {
   double free = 0, by_mode = 0;  // N/m
-  double jacobian = 1, drawn = 0;
+  double jacobian = 1, drawn = 0, flowed = 0;
 };
 
 HourglassGrowth hourglass_growth(const CellKind& kind, const Vec3& spacing, const CellVectors& u,
-                                 const Mat3& gradient) {
+                                 const Mat3& gradient, const std::optional<CellKind>& shaped = {}) {
   const Mat3 f = Mat3::Identity() + gradient;
   Eigen::SelfAdjointEigenSolver<Mat3> eigen;
   eigen.computeDirect(f.transpose() * f, Eigen::EigenvaluesOnly);
   const Mat3 inverse = f.inverse();
   HourglassGrowth growth;
-  double square = 0;
-  for (const Vec3& each : hourglass_displacements(kind, u)) square += (inverse * each).squaredNorm();
-  growth.free = *std::max_element(kind.hourglass.begin(), kind.hourglass.end());
+  const auto size = [&](const std::array<Vec3, 4>& of) {
+    double square = 0;
+    for (const Vec3& each : of) square += each.squaredNorm();
+    return std::sqrt(square) / spacing.minCoeff();
+  };
+  const auto drawn_back = [&](std::array<Vec3, 4> q) {
+    for (Vec3& each : q) each = (inverse * each).eval();
+    return size(q);
+  };
+  const CellKind& of = shaped ? *shaped : kind;
+  growth.free = *std::max_element(of.hourglass.begin(), of.hourglass.end());
   growth.by_mode = kind.by_mode_largest / std::max(eigen.eigenvalues()[0], 1e-12);
   growth.jacobian = 1 + volume_change(gradient);
-  growth.drawn = std::sqrt(square) / spacing.minCoeff();
+  growth.drawn = drawn_back(hourglass_displacements(kind, u));
+  if (!shaped) return growth;
+  growth.drawn = std::max(growth.drawn, drawn_back(hourglass_displacements(*shaped, u)));
+  growth.flowed = size(shaped->mode_offset);
   return growth;
 }
 
 // Of the energy over the largest eigenvalue at rest `largest` [N/m], at most: alone, and what the coupling of q_m with F adds.
 // With k = J K / s_min^2 the second derivative of J/2 p K p is at most k times
 //     (|dq| + |dF| |p|)^2 + 2 (1 + sqrt 3) |p| |dF| (|dq| + |dF| |p|) + 2 |p|^2 |dF|^2,
-// and of displacements of size 1 |dq|^2 is at most 1/8, |dF|^2 1 / (2 h^2), |dq| |dF| 1 / (8 h).
+// and of displacements of size 1 |dq|^2 is at most 1/8, |dF|^2 1 / (2 h^2), |dq| |dF| 1 / (8 h). That of c_m |q_m - F Q_m|^2 / 2
+// is c_m (|dq| + |dF| |Q|)^2 at most.
 double alone(const HourglassGrowth& growth, double largest) {
   return (growth.free + growth.jacobian * growth.by_mode) / 8 / largest;
 }
 double coupling(const HourglassGrowth& growth, double largest) {
-  return growth.jacobian * growth.by_mode * growth.drawn * (1 + 4.3 * growth.drawn) / largest;
+  return (growth.jacobian * growth.by_mode * growth.drawn * (1 + 4.3 * growth.drawn) +
+          growth.free * growth.flowed * (0.25 + 0.5 * growth.flowed)) /
+         largest;
 }
 
 // Of a whole cell [N/m].
@@ -116,11 +130,9 @@ double mean_stiffening(const CellKind& kind, const Vec3& spacing, const Mat3& gr
 double cell_stiffening(const CellKind& kind, const Vec3& spacing, const CellVectors& u, bool plastic,
                        const std::optional<CellKind>& shaped, double largest) {
   const Mat3 gradient = displacement_gradient(kind, u);
-  const double volume = shaped ? shaped->volume / kind.volume : 1;
-  const HourglassGrowth hourglass = hourglass_growth(kind, spacing, u, gradient);
-  return std::max(mean_stiffening(kind, spacing, gradient, plastic, shaped),
-                  volume * alone(hourglass, largest)) +
-         volume * coupling(hourglass, largest);
+  const HourglassGrowth hourglass = hourglass_growth(kind, spacing, u, gradient, shaped);
+  return std::max(mean_stiffening(kind, spacing, gradient, plastic, shaped), alone(hourglass, largest)) +
+         coupling(hourglass, largest);
 }
 
 // k (1 + extension) at most; compression turns the cross stiffness k (1 - l/d) negative, which slows.
