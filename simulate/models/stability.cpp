@@ -98,15 +98,6 @@ double coupling(const HourglassGrowth& growth, double largest) {
          largest;
 }
 
-// Of a whole cell [N/m].
-double largest_at_rest(const Problem& problem, std::size_t part) {
-  const Lattice& lattice = problem.body.parts[part].lattice;
-  const Material& material = problem.materials[part];
-  const CornersMatrix k = is_springs(problem, part) ? springs_stiffness(spring_kind(lattice, material))
-                                                    : cells_stiffness(cell_kind(lattice, material));
-  return eigenvalues_symmetric(k)[23];
-}
-
 // With plastic flow, of neo-Hooke alone, its stretch counts too (simulate/laws/neo_hooke_scalar.h). Other laws
 // bound by the largest modulus, exact for cubes: a cell's largest eigenvalue is that modulus times the gradients'
 // squares, which spacings differ in.
@@ -235,32 +226,37 @@ std::vector<double> greatest_factors(const Problem& problem, const std::vector<V
 
 }  // namespace
 
-std::vector<double> damping_growth(const Problem& problem, const std::vector<Vec3>& displacement,
-                                   const std::vector<double>& frequencies) {
+std::vector<CellOfPart> cells_of_parts(const Problem& problem) {
+  std::vector<CellOfPart> result;
+  for (std::size_t p = 0; p < problem.body.parts.size(); ++p) {
+    const Part& part = problem.body.parts[p];
+    const Material& material = problem.materials[p];
+    result.push_back({cell_kind(part.lattice, material), spring_kind(part.lattice, material)});
+    CellOfPart& made = result.back();
+    const bool rigid = problem.rigidity.size() > p && problem.rigidity[p] != Rigidity::none;
+    if (part.cell_begin == part.cell_end || rigid) continue;
+    made.largest = eigenvalues_symmetric(is_springs(problem, p) ? springs_stiffness(made.springs)
+                                                                : cells_stiffness(made.cells))[23];
+    made.frequency = made.largest / (material.density * part.lattice.spacing.prod() / 8);
+  }
+  return result;
+}
+
+std::vector<double> damping_growth(const Problem& problem, const std::vector<CellOfPart>& cells,
+                                   const std::vector<Vec3>& displacement) {
   return greatest_factors(problem, displacement, [&](std::size_t p) {
     const Lattice& lattice = problem.body.parts[p].lattice;
-    const Material& material = problem.materials[p];
-    const double largest = frequencies[p] * material.density * lattice.spacing.prod() / 8;  // N/m
-    return [&lattice, largest, by_springs = is_springs(problem, p), cells = cell_kind(lattice, material),
-            springs = spring_kind(lattice, material)](std::uint32_t, const CellVectors& u) {
-      return by_springs ? damping_growth(springs, cells, u, largest)
-                        : damping_growth(cells, lattice.spacing, u, largest);
-    };
+    return
+        [&lattice, &of = cells[p], by_springs = is_springs(problem, p)](std::uint32_t, const CellVectors& u) {
+          return by_springs ? damping_growth(of.springs, of.cells, u, of.largest)
+                            : damping_growth(of.cells, lattice.spacing, u, of.largest);
+        };
   });
 }
 
 std::vector<double> cell_frequencies(const Problem& problem) {
   std::vector<double> result;
-  for (std::size_t p = 0; p < problem.body.parts.size(); ++p) {
-    const Part& part = problem.body.parts[p];
-    const bool rigid = problem.rigidity.size() > p && problem.rigidity[p] != Rigidity::none;
-    if (part.cell_begin == part.cell_end || rigid) {
-      result.push_back(0);
-      continue;
-    }
-    const double corner_mass = problem.materials[p].density * part.lattice.spacing.prod() / 8;
-    result.push_back(largest_at_rest(problem, p) / corner_mass);
-  }
+  for (const CellOfPart& each : cells_of_parts(problem)) result.push_back(each.frequency);
   return result;
 }
 
@@ -278,8 +274,8 @@ double stable_step(const Problem& problem, const std::vector<double>& damping) {
   return step;
 }
 
-std::vector<double> stiffening(const Problem& problem, const std::vector<Vec3>& displacement,
-                               const KernelEffects& plan) {
+std::vector<double> stiffening(const Problem& problem, const std::vector<CellOfPart>& cells,
+                               const std::vector<Vec3>& displacement, const KernelEffects& plan) {
   const RestShapes shapes(problem.body);
   const bool plastic = !plan.plasticity.empty();
   return greatest_factors(problem, displacement, [&](std::size_t p) {
@@ -287,16 +283,15 @@ std::vector<double> stiffening(const Problem& problem, const std::vector<Vec3>& 
     const bool by_springs = is_springs(problem, p);
     const bool breaks = plan.broken_springs || (!plan.fracture.empty() && plan.fracture[p].any());
     return
-        [&part, &shapes, plastic, by_springs, breaks, largest = largest_at_rest(problem, p),
-         cells = cell_kind(part.lattice, problem.materials[p]),
-         springs = spring_kind(part.lattice, problem.materials[p])](std::uint32_t c, const CellVectors& u) {
-          if (by_springs && !breaks && !(1 + volume_change(displacement_gradient(cells, u)) > 0))
+        [&part, &shapes, &of = cells[p], plastic, by_springs, breaks](std::uint32_t c, const CellVectors& u) {
+          if (by_springs && !breaks && !(1 + volume_change(displacement_gradient(of.cells, u)) > 0))
             return std::numeric_limits<double>::infinity();
           if (by_springs)
-            return springs_stiffening(shapes.any() ? shapes.of(springs, c).value_or(springs) : springs, u);
-          const std::optional<CellKind> shaped = shapes.any() ? shapes.of(cells, part, c) : std::nullopt;
-          return cell_stiffening(cells, part.lattice.spacing, u, plastic, shaped, largest) +
-                 fold_stiffening(cells, fold_thresholds(cells, shaped), u);
+            return springs_stiffening(
+                shapes.any() ? shapes.of(of.springs, c).value_or(of.springs) : of.springs, u);
+          const std::optional<CellKind> shaped = shapes.any() ? shapes.of(of.cells, part, c) : std::nullopt;
+          return cell_stiffening(of.cells, part.lattice.spacing, u, plastic, shaped, of.largest) +
+                 fold_stiffening(of.cells, fold_thresholds(of.cells, shaped), u);
         };
   });
 }

@@ -10,11 +10,22 @@
 #include <vector>
 
 #include "simulate/conditions/kernel_effects.h"
+#include "simulate/models/cell_model.h"
+#include "simulate/models/spring_model.h"
 #include "simulate/state/state.h"
 
 namespace flexel::simulate {
 
-// omega^2 [1/s^2] of one whole cell at rest, by part. 0: the part has no cells.
+// A whole cell of a part at rest. 0 and 0: the part has no cells, or is rigid.
+struct CellOfPart {
+  CellKind cells;
+  SpringKind springs;
+  double largest = 0;    // eigenvalue of its stiffness [N/m]
+  double frequency = 0;  // omega^2 [1/s^2]
+};
+[[nodiscard]] std::vector<CellOfPart> cells_of_parts(const Problem& problem);
+
+// omega^2 [1/s^2] of one whole cell at rest, by part. 0: the part has no cells, or is rigid.
 [[nodiscard]] std::vector<double> cell_frequencies(const Problem& problem);
 
 // The bound on the step [s] for frequency^2 `omega2` and damping time `tau` [s]; infinity for omega2 = 0, 0
@@ -30,14 +41,14 @@ namespace flexel::simulate {
 // bounds it. Infinity: a cell is folded. Springs resist as well inside out, so nothing else tells it of them;
 // where they break a cell of which some are left may turn as it likes.
 // Rest shapes of the body (simulate/models/rest_shape.h) and what edits made of stiffness and mass count.
-[[nodiscard]] std::vector<double> stiffening(const Problem& problem, const std::vector<Vec3>& displacement,
+// `cells`: cells_of_parts(problem).
+[[nodiscard]] std::vector<double> stiffening(const Problem& problem, const std::vector<CellOfPart>& cells,
+                                             const std::vector<Vec3>& displacement,
                                              const KernelEffects& plan);
 
 // Likewise of the internal damping over tau (simulate/implicit/damping_matrix.h): at least 1. With A = sym(F^T dF/dt),
 // |A| <= |F| |dF/dt|, |dJ/dt| <= |cof F| |dF/dt|; hourglass displacements q feel dF/dt too, |q'| <= |dq/dt| + |dF/dt| |F^-1 q|.
-// `frequencies`: cell_frequencies(problem).
-[[nodiscard]] std::vector<double> damping_growth(const Problem& problem,
-                                                 const std::vector<Vec3>& displacement,
-                                                 const std::vector<double>& frequencies);
+[[nodiscard]] std::vector<double> damping_growth(const Problem& problem, const std::vector<CellOfPart>& cells,
+                                                 const std::vector<Vec3>& displacement);
 
 }  // namespace flexel::simulate

@@ -64,8 +64,8 @@ void warn_of_thin_walls(const Body& body, const std::string& scene, Progress& pr
   constexpr double kMuch = 0.2;
   if (const double thin = share_of_thin_walls(body, 2); thin > kMuch)
     progress.warn(
-        fmt::format("{}: {} of the matter lies in walls under 2 cells, which these cells bend too hard or "
-                    "too easily: frequencies may be far off; "
+        fmt::format("{}: {} of the matter lies in walls under 2 cells, which these cells twist too hard, and "
+                    "where the surface cuts them bend too hard or too easily: frequencies may be far off; "
                     "use a smaller spacing, or model = \"quadratic\" on a body of flexel-voxelize --moments",
                     scene, human_share(thin)));
 }

@@ -66,7 +66,7 @@ StepBound::StepBound(const Problem& problem, const std::vector<ActiveEffect>& ef
     : problem_(problem),
       effects_(effects),
       plan_(plan),
-      cells_(cell_frequencies(problem)),
+      cells_(cells_of_parts(problem)),
       stiffening_(cells_.size(), 1),
       connections_(cells_.size(), 0),
       growth_(cells_.size(), 1),
@@ -75,16 +75,16 @@ StepBound::StepBound(const Problem& problem, const std::vector<ActiveEffect>& ef
 bool StepBound::damps_explicitly() const {
   double bare = std::numeric_limits<double>::infinity(), damped = bare;
   for (std::size_t p = 0; p < cells_.size(); ++p) {
-    bare = std::min(bare, stable_step(cells_[p], 0));
-    damped = std::min(damped, stable_step(cells_[p], damping_[p]));
+    bare = std::min(bare, stable_step(cells_[p].frequency, 0));
+    damped = std::min(damped, stable_step(cells_[p].frequency, damping_[p]));
   }
   return damped >= 0.5 * bare;
 }
 
 void StepBound::look(const State& state, const PaperModel* paper, const std::vector<double>& mass) {
-  stiffening_ = stiffening(problem_, state.displacement, plan_);
+  stiffening_ = stiffening(problem_, cells_, state.displacement, plan_);
   if (std::any_of(damping_.begin(), damping_.end(), [](double tau) { return tau > 0; }))
-    growth_ = damping_growth(problem_, state.displacement, cells_);
+    growth_ = damping_growth(problem_, cells_, state.displacement);
   if (paper) connections_ = paper->frequencies(state, mass);
   added_ = 0;
   for (const ActiveEffect& effect : effects_) added_ += effect->added_frequency(state, mass);
@@ -94,14 +94,14 @@ double StepBound::longest(bool staged_damping) const {
   double longest = std::numeric_limits<double>::infinity();
   for (std::size_t p = 0; p < cells_.size(); ++p) {
     // a part has cells or connections
-    const double own = cells_[p] * stiffening_[p] + connections_[p];
+    const double own = cells_[p].frequency * stiffening_[p] + connections_[p];
     const double total = own + added_;
     if (staged_damping && connections_[p] == 0) {
       longest = std::min(longest, std::sqrt(StagedDamping::kLeast / 4) * stable_step(total, 0));
       continue;
     }
     // what effects add is not damped: total dt^2 / 4 + tau own dt / 2 <= 1
-    const double damped = std::max(own, cells_[p] * growth_[p]);
+    const double damped = std::max(own, cells_[p].frequency * growth_[p]);
     longest = std::min(longest, stable_step(total, total > 0 ? damping_[p] * (damped / total) : 0));
   }
   return longest;
@@ -110,7 +110,7 @@ double StepBound::longest(bool staged_damping) const {
 double StepBound::bare_damping_rate() const {
   double largest = 0;
   for (std::size_t p = 0; p < cells_.size(); ++p)
-    largest = std::max(largest, damping_[p] * cells_[p] * growth_[p]);
+    largest = std::max(largest, damping_[p] * cells_[p].frequency * growth_[p]);
   return largest;
 }
 
@@ -133,7 +133,7 @@ bool StepBound::outgrows(double rate, const State& state, double step, std::uint
   const double allowed = kTravel / travel(state, step);
   const auto every = static_cast<std::uint64_t>(std::clamp(allowed, 1.0, kMostSteps));
   if (steps % every != 0) return false;
-  growth_ = damping_growth(problem_, state.displacement, cells_);
+  growth_ = damping_growth(problem_, cells_, state.displacement);
   return kLeastAhead * bare_damping_rate() > rate;
 }
 

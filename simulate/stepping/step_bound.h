@@ -6,6 +6,7 @@
 
 #include "simulate/effects/effect.h"
 #include "simulate/models/paper_model.h"
+#include "simulate/models/stability.h"
 
 namespace flexel::simulate {
 
@@ -37,10 +38,11 @@ class StepBound {
   const Problem& problem_;
   const std::vector<ActiveEffect>& effects_;
   const KernelEffects& plan_;
-  std::vector<double> cells_, stiffening_, connections_;  // (parts) 1/s^2 at rest, its growth; 1/s^2
-  std::vector<double> growth_;                            // (parts) of the damping
-  std::vector<double> damping_;                           // (parts) s, the longest time of a cell
-  double added_ = 0;                                      // 1/s^2
+  std::vector<CellOfPart> cells_;                 // (parts)
+  std::vector<double> stiffening_, connections_;  // (parts) growth of the cells' frequency^2; 1/s^2
+  std::vector<double> growth_;                    // (parts) of the damping
+  std::vector<double> damping_;                   // (parts) s, the longest time of a cell
+  double added_ = 0;                              // 1/s^2
 };
 
 }  // namespace flexel::simulate

@@ -426,7 +426,7 @@ TEST(CellModel, StiffnessIsWithinTheBoundOfTheStep) {
         const Problem problem = testing::problem_of(body, material);
         ++seen;
         EXPECT_LE(largest(tangent_of(kind, u)),
-                  (1 + 1e-9) * at_rest * stiffening(problem, displacement, {{0}})[0])
+                  (1 + 1e-9) * at_rest * stiffening(problem, cells_of_parts(problem), displacement, {{0}})[0])
             << material.poisson << ", round " << round;
       }
     }
@@ -454,7 +454,8 @@ TEST(CellModel, StiffnessIsWithinTheBoundOfTheStepBesideABentRestShape) {
       body.cell_columns["plastic_hourglass"] = {12, column};
       const CellKind bent = with_rest_shape(kind, Mat3::Zero(), 1, q);
       EXPECT_LE(largest(tangent_of(bent, rest)),
-                (1 + 1e-9) * largest(blocks_at_rest(kind)) * stiffening(problem, back, {{0}})[0])
+                (1 + 1e-9) * largest(blocks_at_rest(kind)) *
+                    stiffening(problem, cells_of_parts(problem), back, {{0}})[0])
           << poisson << ", form " << form;
     }
   }
