@@ -75,9 +75,9 @@ def instructions_of(command_for, elements):
 def models():
     """Instructions of the other models; what a model refuses is left out."""
     lines = ["| the scene names | `cells` | `springs` | `paper` |", "|---|---|---|---|"]
-    elements = make_block(COUNTED_CELLS)
     rows = {}
     for model in ("cells", "springs", "paper"):
+        elements = make_block(COUNTED_CELLS, "centre" if model == "paper" else "corner")
         for row, effect in {"nothing": "", **EFFECTS}.items():
             try:
                 rows.setdefault(row, []).append(instructions_of(lambda steps, e=effect, m=model: simulate_command(steps, e, m), elements))

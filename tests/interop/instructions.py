@@ -29,19 +29,19 @@ EFFECTS = {
     "`[[fix]]` of a side": '[[fix]]\nwhere = "xmin"\n',
     "`[[fix]]` of elements": '[[fix]]\nwhere = { half_space = { point = ["0.5 mm", 0, 0], normal = [-1, 0, 0] } }\n',
     "`[[velocity]]`": '[[velocity]]\nwhere = "block"\nvelocity = ["0 m/s", "0 m/s", "1 m/s"]\n',
-    "`[damping]`": '[damping]\ntime = "2 us"\n',
+    "`[damping]`": '[damping]\ntime = "1 us"\n',
     "`[drag]`": '[drag]\ndensity = "1.2 kg/m3"\n',
     "`[plasticity]`": '[plasticity]\nyield = "1 GPa"\n',
     "`[fracture]`": '[fracture]\nstrength = "1 GPa"\n',
 }
 
 
-def make_block(cells):
-    """block.stl and block.vtu of cells^3 cells of a millimetre."""
+def make_block(cells, placement="corner"):
+    """block.stl and block.vtu of cells^3 cells of a millimetre; its elements."""
     pathlib.Path("block.stl").write_bytes(binary_stl(box_triangles(3 * (float(cells),))))
-    subprocess.run(["flexel-voxelize", "block.stl", "--size", "1 mm", "--align", "none", "--quiet", "-o", "block.vtu"], check=True,
-                   timeout=120)
-    return (cells + 1)**3
+    subprocess.run(["flexel-voxelize", "block.stl", "--size", "1 mm", "--align", "none", "--placement", placement, "--quiet", "-o", "block.vtu"],
+                   check=True, timeout=120)
+    return (cells + (placement == "corner"))**3
 
 
 PAIR = MATTER.replace("[parts.block]\n", "").replace('material = "gum"\n', 'material = "gum"\nmodel = "{model}"\n').replace('model = "{model}"\n[run]', "[run]").replace("10 us", "5 us")
