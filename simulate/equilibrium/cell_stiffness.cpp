@@ -260,7 +260,7 @@ void CellStiffness::prepare_lane(std::uint32_t cell, const State& state, const T
   }
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
-      const auto column = static_cast<std::size_t>(3 * i + j);
+      const auto column = 3 * static_cast<std::size_t>(i) + static_cast<std::size_t>(j);
       to[kLanes * column] = prepared.hourglass.inverse_transpose(i, j);
       to[kLanes * (9 + column)] = prepared.hourglass.arm[static_cast<std::size_t>(i)][j];
     }

@@ -209,6 +209,14 @@ std::string first_sentence(const std::string& text) {
   return text.substr(0, text.find(": add "));
 }
 
+// `least`: of the value, or 0.
+std::string of_one_difference(const std::string& reason, double least) {
+  return fmt::format(
+      "a lattice four times as coarse is of no use ({}): the bars are three times the only difference{}",
+      first_sentence(reason),
+      least > 0 ? fmt::format(" and at least {:.0f} % of the value", 100 * least) : "");
+}
+
 }  // namespace
 
 double refinement_for_walls(const Body& body) {
@@ -248,14 +256,8 @@ ErrorBars estimate_errors(const Body& body, const Scene& scene, const SimulateOp
     }
   } else {
     wide = true;
-    errors.note = fmt::format(
-        "a lattice four times as coarse is of no use ({}): the bars are three times the "
-        "only difference",
-        first_sentence(reason));
-    if (!quadratic) {
-      least = thin_walls(body, kFewCells, quadratic) ? kFewCellsLeave : kOneDifferenceLeaves;
-      errors.note += fmt::format(" and at least {:.0f} % of the value", 100 * least);
-    }
+    if (!quadratic) least = thin_walls(body, kFewCells, quadratic) ? kFewCellsLeave : kOneDifferenceLeaves;
+    errors.note = of_one_difference(reason, quadratic ? 0 : least);
   }
   const auto bar = [&](const Sequence& values) {
     const Bar found = wide ? wide_bar(values) : richardson(values);
