@@ -167,8 +167,9 @@ std::string how_sure(const SimulateResult& result, const Body& body) {
                                                        : note.substr(why + 8));
   }
   const std::string cells = fmt::format("{} cells beside coarser ones", human_count(body.cell_count()));
+  constexpr double kRounding = 1 + 1e-12;  // of bars that are 20 % of the value and no more
   if (*worst <= 0.05) return fmt::format("well, {}: {}", within(*worst), cells);
-  if (*worst <= 0.2) return fmt::format("fairly, {}: {}", within(*worst), cells);
+  if (*worst <= 0.2 * kRounding) return fmt::format("fairly, {}: {}", within(*worst), cells);
   if (*worst <= kGuess) return fmt::format("roughly, {}{}", within(*worst), reason(result));
   return fmt::format("hardly, off by up to {}{}", human_share(*worst), reason(result));
 }
