@@ -329,12 +329,11 @@ void CellStiffness::eliminate_prescribed(const Constraints& constraints) {
     if (constraints.mask[e]) held_.push_back(e);
   if (held_.empty()) return;
   held_diagonal_.resize(held_.size());
-  const std::vector<Block> own = diagonal();
-  for (std::size_t h = 0; h < held_.size(); ++h)
-    for (int axis = 0; axis < 3; ++axis) {
-      const double value = own[held_[h]](axis, axis);
-      held_diagonal_[h][axis] = value > 0 ? value : 1;
-    }
+  parallel_for_each(held_.size(), [&](std::size_t h) {
+    Block own = cells_diagonal_.empty() ? diagonal_of_cells(held_[h]) : cells_diagonal_[held_[h]];
+    add_others(held_[h], own);
+    for (int axis = 0; axis < 3; ++axis) held_diagonal_[h][axis] = own(axis, axis) > 0 ? own(axis, axis) : 1;
+  });
   mask_ = constraints.mask;
 }
 
@@ -435,37 +434,33 @@ void CellStiffness::multiply(const double* x, double* y) const {
       }
 }
 
-void CellStiffness::deformed_blocks(const PartKind& part, const double* from, double share, std::size_t a,
-                                    std::size_t begin, std::size_t end, Block* out) const {
-  const CellKind& kind = part.kind;
+// Without the hourglass stiffness by mode.
+void CellStiffness::mean_blocks(const CellKind& kind, const double* from, double share, std::size_t a,
+                                std::size_t begin, std::size_t end, Block* out) const {
   const double* mean = from + kLanes * step::kHourglassColumns;
-  const HourglassTangent hourglass = hourglass_of(kind, from);
   if (form_ == TangentForm::moduli) {
     Mat9 moduli;
     for (std::size_t c = 0; c < 81; ++c)
       moduli(static_cast<Eigen::Index>(c / 9), static_cast<Eigen::Index>(c % 9)) = mean[kLanes * c];
     for (std::size_t b = begin; b < end; ++b) out[b] = share * projected_block(kind, moduli, a, b);
-    add_hourglass_row(kind, hourglass, share, a, begin, end, out);
     return;
   }
-  const Mat3& g = hourglass.inverse_transpose;
-  Mat3 added;
+  Mat3 g, added;
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) added(i, j) = mean[kLanes * static_cast<std::size_t>(1 + kStressOf[i][j])];
+    for (int j = 0; j < 3; ++j) {
+      g(i, j) = from[kLanes * static_cast<std::size_t>(3 * i + j)];
+      added(i, j) = mean[kLanes * static_cast<std::size_t>(1 + kStressOf[i][j])];
+    }
   const double scale = share * kind.volume / 16;
-  std::array<Vec3, 8> w;
-  for (std::size_t b = 0; b < 4; ++b) {
-    w[b] = g * kind.gradient[b];
-    w[7 - b] = -w[b];
-  }
-  const Vec3 symmetric = (scale * kind.lambda) * w[a], swapped = (scale * mean[0]) * w[a];
+  const Vec3 w_a = g * kind.gradient[a];
+  const Vec3 symmetric = (scale * kind.lambda) * w_a, swapped = (scale * mean[0]) * w_a;
   const Vec3 stressed = scale * (added * kind.gradient[a]);
   for (std::size_t b = begin; b < end; ++b) {
-    out[b].noalias() = symmetric * w[b].transpose();
-    out[b].noalias() += w[b] * swapped.transpose();
+    const Vec3 w_b = g * kind.gradient[b];
+    out[b].noalias() = symmetric * w_b.transpose();
+    out[b].noalias() += w_b * swapped.transpose();
     out[b].diagonal().array() += share * kind.diagonal[8 * a + b] + stressed.dot(kind.gradient[b]);
   }
-  add_hourglass_row(kind, hourglass, share, a, begin, end, out);
 }
 
 void CellStiffness::cell_blocks(const Incidence& at, std::size_t begin, std::size_t end, Block* out) const {
@@ -477,8 +472,9 @@ void CellStiffness::cell_blocks(const Incidence& at, std::size_t begin, std::siz
   }
   const std::size_t width = kLanes * step::kTangentColumns[static_cast<std::size_t>(form_)];
   const std::uint32_t place = place_[at.cell];
-  deformed_blocks(part, tangents_.data() + width * (place / kLanes) + place % kLanes, share, at.corner, begin,
-                  end, out);
+  const double* from = tangents_.data() + width * (place / kLanes) + place % kLanes;
+  mean_blocks(part.kind, from, share, at.corner, begin, end, out);
+  add_hourglass_row(part.kind, hourglass_of(part.kind, from), share, at.corner, begin, end, out);
 }
 
 // To the world's frame, where the blocks of cells are in the lattice's.
@@ -545,30 +541,92 @@ const Block* CellStiffness::blocks(std::size_t begin, std::size_t end, std::vect
   return room.data();
 }
 
-std::vector<Block> CellStiffness::diagonal_of_cells() const {
-  std::vector<Block> diagonal(rows());  // touched first by several threads
-  parallel_for_each(rows(), [&](std::size_t e) {
-    std::array<Block, 8> own;
-    diagonal[e].setZero();
-    for (const Incidence& at : pattern_.stencil.of(static_cast<std::uint32_t>(e))) {
-      cell_blocks(at, at.corner, at.corner + 1, own.data());
-      diagonal[e] += own[at.corner];
-    }
-    turn(e, &diagonal[e], 1);
-    if (!folding_.empty())
-      for (const Incidence& at : pattern_.stencil.of(static_cast<std::uint32_t>(e)))
-        if (const FoldTangent* blocks = folding_of(at.cell)) diagonal[e] += (*blocks)[9 * at.corner];
+Block CellStiffness::diagonal_of_cells(std::size_t element) const {
+  std::array<Block, 8> own;
+  Block sum = Block::Zero();
+  for (const Incidence& at : pattern_.stencil.of(static_cast<std::uint32_t>(element))) {
+    cell_blocks(at, at.corner, at.corner + 1, own.data());
+    sum += own[at.corner];
+  }
+  turn(element, &sum, 1);
+  return sum;
+}
+
+// Of all eight corners, for less than two of them take one by one.
+void CellStiffness::deformed_diagonal(std::uint32_t cell, std::array<Block, 8>& out) const {
+  const std::size_t width = kLanes * step::kTangentColumns[static_cast<std::size_t>(form_)];
+  const std::uint32_t place = place_[cell];
+  const double* from = tangents_.data() + width * (place / kLanes) + place % kLanes;
+  const CellKind& kind = kinds_[part_[cell]].kind;
+  for (std::size_t b = 0; b < 4; ++b) {
+    mean_blocks(kind, from, share_[cell], b, b, b + 1, out.data());
+    // The gradient's sign is all that the opposite corner differs in.
+    out[7 - b] = out[b];
+  }
+  add_hourglass_diagonal(kind, hourglass_of(kind, from), share_[cell], out.data());
+}
+
+// By the chunks of products_of_cells(), lattice frame.
+void CellStiffness::add_deformed_diagonals(std::vector<Block>& diagonal) const {
+  std::vector<Block> shared(layout_.shared.size());
+  parallel_for_each(
+      layout_.chunks.size(),
+      [&](std::size_t i) {
+        const StepLayout::Chunk& chunk = layout_.chunks[i];
+        const std::uint16_t* corners = layout_.corners.data() + chunk.corner_begin;
+        std::vector<Block> sum(chunk.element_end - chunk.element_begin, Block::Zero());
+        std::array<Block, 8> own;
+        for (std::size_t b = chunk.block_begin; b < chunk.block_end; ++b) {
+          const step::CellBlock& block = layout_.blocks[b];
+          const std::uint16_t* corner = corners + block.corners;
+          for (std::size_t lane = 0; lane < kLanes; ++lane) {
+            const std::uint32_t cell = layout_.block_cells[b][lane];
+            if (cell == StepLayout::kNoCell) continue;
+            deformed_diagonal(cell, own);
+            for (std::size_t a = 0; a < 8; ++a)
+              sum[block.is_run ? corner[a] + lane : corner[kLanes * a + lane]] += own[a];
+          }
+        }
+        for (std::size_t q = chunk.owned_begin; q < chunk.owned_end; ++q)
+          diagonal[layout_.elements[chunk.element_begin + layout_.owned[q]]] = sum[layout_.owned[q]];
+        for (std::size_t q = chunk.shared_begin; q < chunk.shared_end; ++q)
+          shared[q] = sum[layout_.shared[q]];
+      },
+      1);
+  parallel_for_each(layout_.shared_elements.size(), [&](std::size_t i) {
+    Block sum = Block::Zero();
+    for (std::uint32_t s = layout_.slot_offsets[i]; s < layout_.slot_offsets[i + 1]; ++s)
+      sum += shared[layout_.slots[s]];
+    diagonal[layout_.shared_elements[i]] = sum;
   });
+  for (const std::uint32_t e : layout_.lone_elements) diagonal[e].setZero();
+}
+
+std::vector<Block> CellStiffness::diagonals_of_cells() const {
+  std::vector<Block> diagonal(rows());
+  if (form_ == TangentForm::at_rest) {
+    parallel_for_each(rows(), [&](std::size_t e) { diagonal[e] = diagonal_of_cells(e); });
+    return diagonal;
+  }
+  add_deformed_diagonals(diagonal);
+  parallel_for_each(rows(), [&](std::size_t e) { turn(e, &diagonal[e], 1); });
   return diagonal;
 }
 
+// What resists beside the smooth part of the cells.
+void CellStiffness::add_others(std::size_t e, Block& own) const {
+  if (!folding_.empty())
+    for (const Incidence& at : pattern_.stencil.of(static_cast<std::uint32_t>(e)))
+      if (const FoldTangent* blocks = folding_of(at.cell)) own += (*blocks)[9 * at.corner];
+  if (!inertia_.empty()) own.diagonal().array() += inertia_[e];
+  if (added_.row_offsets[e + 1] > added_.row_offsets[e]) own += added_.values[diagonal_position(added_, e)];
+}
+
 std::vector<Block> CellStiffness::diagonal() const {
-  if (keeps_diagonal_ && cells_diagonal_.empty()) cells_diagonal_ = diagonal_of_cells();
-  std::vector<Block> diagonal = keeps_diagonal_ ? cells_diagonal_ : diagonal_of_cells();
+  if (keeps_diagonal_ && cells_diagonal_.empty()) cells_diagonal_ = diagonals_of_cells();
+  std::vector<Block> diagonal = keeps_diagonal_ ? cells_diagonal_ : diagonals_of_cells();
   parallel_for_each(rows(), [&](std::size_t e) {
-    if (!inertia_.empty()) diagonal[e].diagonal().array() += inertia_[e];
-    if (added_.row_offsets[e + 1] > added_.row_offsets[e])
-      diagonal[e] += added_.values[diagonal_position(added_, e)];
+    add_others(e, diagonal[e]);
     if (!mask_.empty() && mask_[e])
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)

@@ -22,11 +22,6 @@
 namespace flexel::simulate {
 namespace {
 
-// v_mb, q'_m = sum_b v_mb v_b. `arm`: F^-1 q_m.
-double rate_weight(const CellKind& kind, std::size_t mode, const Vec3& arm, std::size_t corner) {
-  return kind.mode[mode][corner] - 0.25 * kind.gradient[corner].dot(arm);
-}
-
 void add_hourglass(const CellKind& kind, const CellVectors& u, const Mat3& turned, std::size_t a,
                    std::array<Mat3, 8>& row) {
   HourglassTangent tangent = hourglass_tangent(kind, u, true);
@@ -38,8 +33,8 @@ void add_hourglass(const CellKind& kind, const CellVectors& u, const Mat3& turne
   const std::array<Vec3, 4> q = hourglass_displacements(kind, u);
   for (std::size_t mode = 0; mode < 4; ++mode) {
     const Vec3 arm = turned.transpose() * q[mode];
-    const double scale = kind.hourglass[mode] * rate_weight(kind, mode, arm, a);
-    for (std::size_t b = 0; b < 8; ++b) row[b].diagonal().array() += scale * rate_weight(kind, mode, arm, b);
+    const double scale = kind.hourglass[mode] * carried_mode(kind, arm, mode, a);
+    for (std::size_t b = 0; b < 8; ++b) row[b].diagonal().array() += scale * carried_mode(kind, arm, mode, b);
   }
 }
 

@@ -229,8 +229,7 @@ CellVectors cell_forces(const CellKind& kind, const CellVectors& u) {
   for (std::size_t a = 0; a < 8; ++a) {
     Vec3 force = mean * kind.gradient[a];
     for (std::size_t m = 0; m < 4; ++m) force += (kind.hourglass[m] * kind.mode[m][a]) * q[m];
-    for (std::size_t m = 0; m < 3; ++m)
-      force += (kind.mode[m][a] - 0.25 * kind.gradient[a].dot(by_mode.arm[m])) * by_mode.force[m];
+    for (std::size_t m = 0; m < 3; ++m) force += carried_mode(kind, by_mode.arm[m], m, a) * by_mode.force[m];
     forces[a] = -force;
   }
   return forces;

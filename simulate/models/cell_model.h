@@ -95,13 +95,18 @@ using CellVectors = std::array<Vec3, 8>;  // one vector per element of a cell
                                                           const CellVectors& displacement);
 
 // Of the energy by K, with e = hourglass_displacements(): arms F^-1 e_m [m], forces dU/de_m [N] of xy, yz, zx, energy [J];
-// axes^T F^-1 (axes^T G (F G)^-1), F^-T. The force on element a is -sum_m (w_ma - gamma_a . arm_m / 4) force_m
-// - energy F^-T gamma_a / 4.
+// axes^T F^-1 (axes^T G (F G)^-1), F^-T. The force on element a is -sum_m v_ma force_m - energy F^-T
+// gamma_a / 4.
 struct HourglassForces {
   Mat3 pull, inverse_transpose;
   std::array<Vec3, 3> arm, force;
   double energy = 0;
 };
+// v_ma = w_ma - gamma_a . arm_m / 4: how much of element a's motion the mode m sees, as it is carried with the cell.
+[[nodiscard]] inline double carried_mode(const CellKind& kind, const Vec3& arm, std::size_t mode,
+                                         std::size_t element) {
+  return kind.mode[mode][element] - 0.25 * kind.gradient[element].dot(arm);
+}
 [[nodiscard]] HourglassForces hourglass_forces(const CellKind& kind, const Mat3& gradient,
                                                const std::array<Vec3, 4>& hourglass);
 

@@ -12,6 +12,15 @@ Mat3 positive_part(const Mat3& symmetric) {
          eigen.eigenvectors().transpose();
 }
 
+using CarriedModes = std::array<std::array<double, 8>, 3>;
+
+CarriedModes carried_modes(const CellKind& kind, const HourglassTangent& tangent) {
+  CarriedModes weight;
+  for (std::size_t m = 0; m < 3; ++m)
+    for (std::size_t b = 0; b < 8; ++b) weight[m][b] = carried_mode(kind, tangent.arm[m], m, b);
+  return weight;
+}
+
 }  // namespace
 
 Mat9 prepare_moduli(const CellKind& kind, const Mat3& gradient, bool project, const Mat3* stress) {
@@ -41,10 +50,7 @@ HourglassTangent hourglass_tangent(const CellKind& kind, const CellVectors& u, b
 
 void add_hourglass_row(const CellKind& kind, const HourglassTangent& tangent, double factor, std::size_t a,
                        std::size_t begin, std::size_t end, Block* out) {
-  std::array<std::array<double, 8>, 3> weight;  // v_ma
-  for (std::size_t m = 0; m < 3; ++m)
-    for (std::size_t b = 0; b < 8; ++b)
-      weight[m][b] = kind.mode[m][b] - 0.25 * kind.gradient[b].dot(tangent.arm[m]);
+  const CarriedModes weight = carried_modes(kind, tangent);
   std::array<Mat3, 3> row;
   for (int n = 0; n < 3; ++n) {
     Mat3 sum = Mat3::Zero();
@@ -65,6 +71,22 @@ void add_hourglass_row(const CellKind& kind, const HourglassTangent& tangent, do
     for (std::size_t n = 0; n < 3; ++n) out[b] += weight[n][b] * row[n];
     out[b] += with * w_b.transpose() - w_b * with.transpose() + w_a * r_b.transpose() - r_b * w_a.transpose();
   }
+}
+
+// The terms with r_b and w_b of a row cancel where a = b.
+void add_hourglass_diagonal(const CellKind& kind, const HourglassTangent& tangent, double factor,
+                            Block* out) {
+  const CarriedModes weight = carried_modes(kind, tangent);
+  const Mat3 left = (factor * tangent.jacobian) * tangent.pull.transpose();
+  for (std::size_t m = 0; m < 3; ++m)
+    for (std::size_t n = m; n < 3; ++n) {
+      const Mat3 half =
+          left *
+          kind.by_mode.block<3, 3>(3 * static_cast<Eigen::Index>(m), 3 * static_cast<Eigen::Index>(n)) *
+          tangent.pull;
+      const Mat3 both = m == n ? half : Mat3(half + half.transpose());
+      for (std::size_t b = 0; b < 8; ++b) out[b] += (weight[m][b] * weight[n][b]) * both;
+    }
 }
 
 std::array<Block, 64> blocks_at_rest(const CellKind& kind) {

@@ -23,6 +23,8 @@ struct HourglassTangent {
 // out[b] += factor K_ab for b from `begin` to `end`.
 void add_hourglass_row(const CellKind& kind, const HourglassTangent& tangent, double factor, std::size_t a,
                        std::size_t begin, std::size_t end, Block* out);
+// out[b] += factor K_bb for all eight.
+void add_hourglass_diagonal(const CellKind& kind, const HourglassTangent& tangent, double factor, Block* out);
 
 // Row by row, of any law at rest.
 [[nodiscard]] std::array<Block, 64> blocks_at_rest(const CellKind& kind);
