@@ -56,6 +56,19 @@ class SurfaceMotion {
     if (!cell) return std::nullopt;
     return (*this)(polygon, *cell, at);
   }
+  // m^2: no point in the cell moves further.
+  [[nodiscard]] double most_squared(std::uint32_t cell) const {
+    // The largest sum of the absolute values of the 27 shape functions is 1.25 along each axis (Lebesgue's constant).
+    constexpr double kLebesgue = 1.25 * 1.25 * 1.25;
+    double most = 0;
+    if (field_) {
+      for (const Vec3& node : field_->nodes(cell)) most = std::max(most, node.squaredNorm());
+      return kLebesgue * kLebesgue * most;
+    }
+    for (const std::uint32_t e : body_.cell_elements[cell])
+      most = std::max(most, displacement_[e].squaredNorm());
+    return most;
+  }
 
  private:
   const Body& body_;
@@ -86,15 +99,17 @@ NearestPoints nearest_points(const std::array<Vec3, 3>& corners, const Vec3& to)
   return found;
 }
 
-// Of one triangle, between its corners. Points outside a cell are its neighbours'.
+// Of one triangle, between its corners, in cells where something may move further than `known` [m^2]. Points outside a cell
+// are its neighbours'.
 FirstLargest largest_between_corners(const Body& body, const SurfaceMotion& motion, std::uint32_t polygon,
-                                     const std::array<Vec3, 3>& corners) {
+                                     const std::array<Vec3, 3>& corners, double known) {
   constexpr double kRounding = 1e-9;  // of a cell
   const Part& part = body.parts[body.surface.polygon_part(polygon)];
   FirstLargest largest;
   for (std::uint32_t c = body.surface_cell_offsets[polygon]; c < body.surface_cell_offsets[polygon + 1];
        ++c) {
     const std::uint32_t cell = body.surface_cells[c];
+    if (motion.most_squared(cell) <= known) continue;
     Vec3 middle = Vec3::Zero();
     for (const std::uint32_t e : body.cell_elements[cell]) middle += 0.125 * body.rest[e];
     const NearestPoints points = nearest_points(corners, middle);
@@ -162,7 +177,7 @@ FirstLargest largest_of_surface(const Body& body, const std::vector<Vec3>& displ
     const std::uint32_t polygon = triangles.polygon[t];
     const auto& [a, b, c] = triangles.corners[t];
     const std::vector<Vec3>& at = body.surface.vertices;
-    return largest_between_corners(body, motion, polygon, {at[a], at[b], at[c]});
+    return largest_between_corners(body, motion, polygon, {at[a], at[b], at[c]}, largest.squared);
   });
   if (between.squared > (1 + kMore) * largest.squared) largest = between;
   return largest;

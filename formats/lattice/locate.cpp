@@ -163,11 +163,11 @@ double same_in(const Part& part) {
 }  // namespace
 
 PointHomes::PointHomes(const Body& body, std::span<const std::uint8_t> left_out_cells,
-                       std::span<const std::uint8_t> left_out_elements)
+                       std::span<const std::uint8_t> left_out_elements, std::size_t points)
     : body_(body),
       left_out_cells_(left_out_cells),
       left_out_elements_(left_out_elements),
-      polygons_(body.surface),
+      polygons_(body.surface, points),
       at_surface_(body.cell_count()) {
   for (const std::uint32_t cell : body.surface_cells) at_surface_[cell] = 1;
   for (const Part& part : body.parts) {

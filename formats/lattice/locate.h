@@ -59,9 +59,9 @@ struct PointHome {
 // references to all that it is given.
 class PointHomes {
  public:
-  // `left_out`, of cells and of elements: 1: as if it were not there; may be shorter.
+  // `left_out`, of cells and of elements: 1: as if it were not there; may be shorter. `points`: as many as will be asked about.
   explicit PointHomes(const Body& body, std::span<const std::uint8_t> left_out_cells = {},
-                      std::span<const std::uint8_t> left_out_elements = {});
+                      std::span<const std::uint8_t> left_out_elements = {}, std::size_t points = SIZE_MAX);
 
   // `point`: m, world frame.
   [[nodiscard]] PointHome find(const Vec3& point) const;

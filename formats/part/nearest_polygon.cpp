@@ -11,7 +11,8 @@
 namespace flexel {
 namespace {
 
-constexpr std::uint32_t kFew = 8;  // triangles of a box that is not halved
+constexpr std::uint32_t kFew = 8;      // triangles of a box that is not halved
+constexpr std::size_t kFewPoints = 4;  // that take no longer without a tree
 
 double distance_from(const Vec3& point, const Vec3& low, const Vec3& high) {
   return (low - point).cwiseMax(point - high).cwiseMax(0.0).norm();
@@ -19,13 +20,14 @@ double distance_from(const Vec3& point, const Vec3& low, const Vec3& high) {
 
 }  // namespace
 
-NearestPolygon::NearestPolygon(const Surface& surface)
+NearestPolygon::NearestPolygon(const Surface& surface, std::size_t points)
     : surface_(surface), triangles_(triangulate(surface)), order_(triangles_.corners.size()) {
   std::iota(order_.begin(), order_.end(), 0u);
-  if (!order_.empty()) halve(0, static_cast<std::uint32_t>(order_.size()));
+  const auto count = static_cast<std::uint32_t>(order_.size());
+  if (count > 0) halve(0, count, points <= kFewPoints ? count : kFew);
 }
 
-void NearestPolygon::halve(std::uint32_t begin, std::uint32_t end) {
+void NearestPolygon::halve(std::uint32_t begin, std::uint32_t end, std::uint32_t few) {
   Box box{corner(order_[begin], 0), corner(order_[begin], 0), begin, end};
   for (std::uint32_t i = begin; i < end; ++i)
     for (std::size_t c = 0; c < 3; ++c) {
@@ -34,7 +36,7 @@ void NearestPolygon::halve(std::uint32_t begin, std::uint32_t end) {
     }
   const std::size_t own = boxes_.size();
   boxes_.push_back(box);
-  if (end - begin <= kFew) return;
+  if (end - begin <= few) return;
   Eigen::Index axis = 0;
   (box.high - box.low).maxCoeff(&axis);
   const auto middle = [&](std::uint32_t t) {
@@ -44,9 +46,9 @@ void NearestPolygon::halve(std::uint32_t begin, std::uint32_t end) {
   std::nth_element(
       order_.begin() + begin, order_.begin() + half, order_.begin() + end,
       [&](std::uint32_t a, std::uint32_t b) { return std::pair(middle(a), a) < std::pair(middle(b), b); });
-  halve(begin, half);
+  halve(begin, half, few);
   boxes_[own].second = static_cast<std::uint32_t>(boxes_.size());
-  halve(half, end);
+  halve(half, end, few);
 }
 
 // Of triangles equally near the one of lowest number, whatever order the boxes are looked into.

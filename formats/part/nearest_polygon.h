@@ -1,5 +1,6 @@
 // The polygon of a surface at rest that is nearest to a point.
 #pragma once
+#include <cstdint>
 #include <functional>
 #include <optional>
 
@@ -18,7 +19,8 @@ struct NearPolygon {
 // A tree of boxes around the surface's triangles. Keeps a reference to the surface.
 class NearestPolygon {
  public:
-  explicit NearestPolygon(const Surface& surface);
+  // `points`: as many as will be asked about. For a few all triangles are looked at, which takes less than the tree does.
+  explicit NearestPolygon(const Surface& surface, std::size_t points = SIZE_MAX);
 
   // Of the polygons that count. Distances that differ by less than `same` [m] are one: of polygons that touch one
   // on whose inner side the point lies is taken. Nothing where none counts.
@@ -36,7 +38,7 @@ class NearestPolygon {
     double rank = 0;
     std::optional<NearPolygon> found;
   };
-  void halve(std::uint32_t begin, std::uint32_t end);
+  void halve(std::uint32_t begin, std::uint32_t end, std::uint32_t few);
   void look_into(std::uint32_t box, const Vec3& point, double same,
                  const std::function<bool(std::uint32_t)>& counts, Best& best) const;
   void consider(std::uint32_t triangle, const Vec3& point, double same, Best& best) const;

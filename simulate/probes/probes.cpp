@@ -79,7 +79,8 @@ std::vector<ProbePoints> place_probes(const Scene& scene, const Problem& problem
   std::optional<PointHomes> homes;  // a probe at a point needs them
   for (const Probe& probe :
        scene.coming_parts.empty() ? scene.probes : without_coming_probes(scene, problem.body)) {
-    if (probe.at && !homes) homes.emplace(problem.body, problem.stray_cell, problem.stray_element);
+    if (probe.at && !homes)
+      homes.emplace(problem.body, problem.stray_cell, problem.stray_element, scene.probes.size());
     placed.push_back(probe.at      ? place_point(probe, problem, *homes)
                      : probe.where ? place_selection(probe, problem)
                                    : ProbePoints{probe.name});
