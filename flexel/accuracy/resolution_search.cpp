@@ -325,9 +325,19 @@ class Search {
     if (asked && !goal_.within && given_up_ == 0 && affordable(predicted))
       return "";  // time was not the reason
     const double seconds = predicted.seconds + (asked ? seconds_since(goal_.began) : 0.2 * predicted.seconds);
-    if (predicted.bytes > memory_limit() || seconds > kPatience) return "";
+    if (predicted.bytes > memory_limit() || seconds > kPatience) return met() ? "" : goes_on();
     return fmt::format("--accuracy {}{} takes about {}", fmt::format("{:.6g}%", 100 * goal),
                        seconds > kTimeMargin * kUsualLimit ? " --within 10min" : "", human_seconds(seconds));
+  }
+  // Where the error that was aimed at is out of reach: the time of a run with half the spacing.
+  [[nodiscard]] std::string goes_on() const {
+    const study::Prediction predicted = prediction(runs_.back().size / kUsualStep);
+    const double seconds = (seconds_since(goal_.began) + predicted.seconds) / kTimeMargin;
+    if (predicted.bytes > memory_limit()) return "";
+    for (const int minutes : {1, 2, 3, 5, 10})
+      if (const double longer = 60.0 * minutes; longer >= seconds && longer > goal_.within.value_or(0))
+        return fmt::format("--within {}min makes a finer run", minutes);
+    return "";
   }
   static double finer_goal(double error) {
     for (const double each : {0.1, 0.05, 0.02, 0.01, 0.005, 0.002})
