@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 
 #include "base/error.h"
 #include "base/stop.h"
@@ -99,6 +100,18 @@ TEST(Accuracy, WithinIsTheFinestThatFits) {
   // The runs take no time of their own: about 0.85 x 20 s at 1e-4 s a cell
   EXPECT_LT(report.runs.back().seconds, 20);
   EXPECT_GT(report.runs.back().seconds, 8);
+}
+
+TEST(Accuracy, WhereTheErrorIsOutOfReachMoreTimeIsAdvisedAndGetsFiner) {
+  const SolveAt slow = made_up([](double h) { return 1 + 3 * std::sqrt(h); }, 1e-4);
+  const AccuracyReport report = choose(slow, 0.001, 20);
+  EXPECT_FALSE(report.met());
+  int minutes = 0;
+  ASSERT_EQ(std::sscanf(report.advice.c_str(), "--within %dmin makes a finer run", &minutes), 1)
+      << report.advice;
+  EXPECT_LE(choose(slow, 0.001, 60.0 * minutes).runs.back().size, 0.6 * report.runs.back().size);
+  // ten minutes would not do either
+  EXPECT_EQ(choose(slow, 0.001, 600).advice, "");
 }
 
 // A wall that is cut once more below a size has twice the cells there: counted before anything is solved.
