@@ -699,18 +699,15 @@ std::string next_step(const SolvedRun& run, const simulate::Scene& scene,
   if (suits_quadratic(run, scene) && has_thin_walls(run) && accuracy->dropped_model.empty() &&
       !accuracy->tried_quadratic)
     return "--model quadratic is made for walls as thin as these";
-  std::string chosen_for;
-  if (accuracy->goal.error) chosen_for += human_share(*accuracy->goal.error);
-  if (accuracy->goal.within)
-    chosen_for +=
-        fmt::format("{}within {}", chosen_for.empty() ? "" : " ", human_seconds(*accuracy->goal.within));
+  std::string chosen = accuracy->goal.error ? "for " + human_share(*accuracy->goal.error) : "to end";
+  if (accuracy->goal.within) chosen += " within " + human_seconds(*accuracy->goal.within);
   const bool usual = accuracy->method == name_of(&mapping::kBlended) ||
                      accuracy->method == name_of(&mapping::kShapeFunctions);
   const std::string method = usual ? "" : " --method " + accuracy->method;
   const bool quadratic = QuadraticField::is_in(run.voxels.body);
   const std::string repeat =
-      fmt::format("--size {}{}{} repeats this run, chosen for {}", size_text(accuracy->runs.back().size),
-                  quadratic ? " --model quadratic" : "", method, chosen_for);
+      fmt::format("--size {}{}{} repeats this run, chosen {}", size_text(accuracy->runs.back().size),
+                  quadratic ? " --model quadratic" : "", method, chosen);
   return accuracy->advice.empty() ? repeat : accuracy->advice + "; " + repeat;
 }
 
