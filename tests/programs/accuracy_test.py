@@ -128,6 +128,7 @@ def test_within():
         return
     expect(len(runs) > 1 and sum(run["seconds"] for run in runs[:-1]) + runs[-1]["predicted_seconds"] <= 10, told)
     expect(told["met"] == (told["seconds"] <= 10) and "--within 10s" in said, told)
+    expect("chosen to end within 10 s" in said, said)
     expect(runs[-1]["cells"] > 2 * runs[0]["cells"], told)
 
 
