@@ -176,5 +176,19 @@ def test_commands():
     expect(not os.listdir("."), "nothing written")
 
 
+def test_options_that_nothing_takes_are_refused():
+    """The body that -o x.vtu writes has its true shape, and a file's extension tells its format."""
+    box()
+    case = ["box.stl", *CASE, "--force"]
+    for out in ("x.vtu", "x.png", "x.html"):
+        expect_error(run("flexel", "deform", *case, "--scale", "10", "-o", out), "flexel", "--scale is for surfaces", "bent.stl")
+    expect_error(run("flexel", "deform", *case, "--format", "obj", "-o", "x.stl"), "flexel", "--format obj", "-o bent.obj")
+    expect_ok(run("flexel", "deform", *case, "--scale", "10", "-o", "x.vtu", "-o", "x.stl"))
+    expect_ok(run("flexel", "deform", *case, "-o", "bent.obj", "--format", "stl", "-o", "-"))
+    write("m.toml", 'model = "cells"\n')
+    refused = run("flexel", "study", "box.stl", "--scene", "m.toml", "--model", "springs", "--material", "steel", "--gravity", "1 g", "-o", "st")
+    expect_error(refused, "flexel", "m.toml: has model already: leave --model out")
+
+
 if __name__ == "__main__":
     main(globals())
