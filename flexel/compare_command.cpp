@@ -57,8 +57,8 @@ struct Finding {
   double least = 0, most = std::numeric_limits<double>::infinity();  // of the stiffness
   std::optional<double> stress;                                      // largest von Mises stress
   // Of the part that is nearest to its limit: limit over stress, and what it yields or breaks at.
-  std::optional<double> factor, limit;
-  std::string limit_name;  // "yield" or "strength"
+  std::optional<double> factor, limit, across;  // across: of a print's layers
+  std::string limit_name;                       // "yield" or "strength"
   std::size_t cells = 0;
 };
 
@@ -124,8 +124,9 @@ void judge_stress(const simulate::SimulateResult& result, const simulate::Scene&
   std::vector<std::string> unknown;
   const auto near = nearest_to_strength(body, materials_of_parts(scene, body), unknown);
   if (!near || !(near->share > 0)) return;
-  if (near->share <= 1 && result.stress->lacks_bending()) return;  // it would be too good
+  if (near->nearest_share() <= 1 && result.stress->lacks_bending()) return;  // it would be too good
   found.factor = 1 / near->share;
+  if (near->layer_share && *near->layer_share > 0) found.across = 1 / *near->layer_share;
   found.limit = near->limit;
   found.limit_name = near->yields ? "yield" : "strength";
 }
@@ -214,11 +215,14 @@ std::string stiffness_text(double value) {
   return per_mm >= 1000 ? human_number(1e-3 * per_mm) + " kN/mm" : human_number(per_mm) + " N/mm";
 }
 
-// "2.9 against yield"; beyond some thousand the figure says no more.
-std::string factor_text(double factor, const std::string& limit) {
+// "2.9 against yield, 1.5 across layers"; beyond some thousand the figure says no more.
+std::string factor_text(const Finding& found) {
   constexpr double kMuch = 1000;
-  return fmt::format("{} against {}",
-                     factor > kMuch ? "over " + human_number(kMuch) : human_number(factor, 2), limit);
+  const auto number = [](double factor) {
+    return factor > kMuch ? "over " + human_number(kMuch) : human_number(factor, 2);
+  };
+  return fmt::format("{} against {}{}", number(*found.factor), found.limit_name,
+                     found.across ? fmt::format(", {} across layers", number(*found.across)) : "");
 }
 
 std::vector<std::pair<std::string, std::vector<std::string>>> rows_of(const std::vector<Finding>& all) {
@@ -242,8 +246,7 @@ std::vector<std::pair<std::string, std::vector<std::string>>> rows_of(const std:
   });
   add("largest von Mises stress",
       [](const Finding& f) { return f.stress ? human_pressure(*f.stress) : "-"; });
-  add("safety factor",
-      [](const Finding& f) { return f.factor ? factor_text(*f.factor, f.limit_name) : std::string("-"); });
+  add("safety factor", [](const Finding& f) { return f.factor ? factor_text(f) : std::string("-"); });
   add("cells", [](const Finding& f) {
     return fmt::format("{} of {}", human_count(f.cells), human_length(f.spacing));
   });
@@ -329,6 +332,7 @@ std::string comparison_json(const std::vector<Finding>& all) {
          {"stiffness_bar", {f.share ? json_number(f.least) : Json(), f.share ? json_number(f.most) : Json()}},
          {"von_mises", json_number(f.stress)},
          {"safety_factor", json_number(f.factor)},
+         {"safety_factor_across_layers", json_number(f.across)},
          {"limit", json_number(f.limit)},
          {"limit_is", f.limit_name},
          {"cells", f.cells},
