@@ -68,6 +68,8 @@ def test_edge_splits_meshes_of_every_format():
         expect("were split" not in whole.err, "short enough already")
     expect_error(run("flexel-voxelize", "box.obj", "--edge", "1 um", "-o", "x.vtu"), "flexel-voxelize", "box.obj", "larger --edge")
     expect_error(run("flexel", "deform", "box.obj", *CASE, "--edge", "0 mm", "-o", "x.stl"), "flexel", "--edge")
+    below = run("flexel", "deform", "box.obj", "--material", "steel", "--fix", "xmin", "--gravity", "1 g", "--count", "-5", "-o", "x.stl")
+    expect_error(below, "flexel", "--count: must be above zero")
 
 
 def test_deform_equals_the_pipe():
