@@ -24,16 +24,20 @@
 #include "flexel/job.h"
 #include "formats/part/topology.h"
 #include "simulate/indent/indenters.h"
+#include "simulate/input/infill.h"
 #include "simulate/result/options.h"
 #include "simulate/result/result.h"
 #include "simulate/scene/strength.h"
 #include "simulate/simulate.h"
+#include "simulate/thermal/thermal.h"
+#include "voxelize/report.h"
 #include "voxelize/voxelize.h"
 
 namespace flexel::commands {
 namespace {
 
 constexpr double kRounding = 1e-6;
+constexpr double kAgainst = 0.1;  // of all forces: forces of which less is left act against each other
 
 struct CompareArguments {
   JobArguments job;
@@ -43,7 +47,8 @@ struct CompareArguments {
 
 // What one part came to; SI.
 struct Finding {
-  std::string file;
+  std::string file;  // its name, with folders where another has the same
+  std::vector<std::string> warnings, notes;
   double size = 0;  // m, of the bounding box's diagonal
   double mass = 0, volume = 0, displacement = 0, force = 0, seconds = 0, spacing = 0;
   std::optional<double> bar;        // of the displacement
@@ -52,8 +57,8 @@ struct Finding {
   double least = 0, most = std::numeric_limits<double>::infinity();  // of the stiffness
   std::optional<double> stress;                                      // largest von Mises stress
   // Of the part that is nearest to its limit: limit over stress, and what it yields or breaks at.
-  std::optional<double> factor, limit;
-  std::string limit_name;  // "yield" or "strength"
+  std::optional<double> factor, limit, across;  // across: of a print's layers
+  std::string limit_name;                       // "yield" or "strength"
   std::size_t cells = 0;
 };
 
@@ -64,32 +69,42 @@ std::optional<simulate::ErrorBar> error_bar_of(const simulate::SimulateResult& r
   return std::nullopt;
 }
 
-// Of the loads, else what the moves take.
-double resultant(const simulate::SimulateResult& result, const simulate::Scene& scene, bool& driven) {
+// Of the loads, else what the moves take; 0 where that is no measure of stiffness.
+double resultant(const simulate::SimulateResult& result, const simulate::Scene& scene, double size,
+                 bool& driven) {
   driven = false;
   if (!scene.get<simulate::Indenters>().indenters.empty()) return 0;  // contact is in proportion to nothing
-  Vec3 sum = Vec3::Zero();
-  for (const simulate::AppliedLoad& load : result.loads) sum += load.force;
+  const auto& heat = scene.get<simulate::Thermal>();
+  if (heat.expands() || heat.conducts()) return 0;  // matter that expands moves without a force
   bool turned = false;
   for (const simulate::Tie& tie : scene.get<simulate::Supports>().ties) {
     driven = driven || tie.is_move;
     turned = turned || (tie.is_move && tie.motion.angle != 0);
   }
   if (turned) return 0;  // a couple over an angle is no force over a displacement
-  if (!driven) return sum.norm();
-  sum.setZero();
-  for (const simulate::Reaction& reaction : result.reactions)
-    if (reaction.is_move) sum += reaction.force;
+  Vec3 sum = Vec3::Zero();
+  double all = 0, moment = 0;  // N, what acts one way or another; N m
+  const auto add = [&](const Vec3& force) {
+    sum += force;
+    all += force.norm();
+  };
+  if (driven) {
+    for (const simulate::Reaction& reaction : result.reactions)
+      if (reaction.is_move) add(reaction.force);
+  } else {
+    for (const simulate::AppliedLoad& load : result.loads) {
+      add(load.force);
+      moment = std::max(moment, load.moment.norm());
+    }
+  }
+  // What rounding leaves of a couple is no force, nor what is left of forces against each other.
+  if (!(sum.norm() * size > kRounding * moment) || sum.norm() < kAgainst * all) return 0;
   return sum.norm();
 }
 
 void judge_stiffness(const simulate::SimulateResult& result, const simulate::Scene& scene, Finding& found) {
   bool driven = false;
-  found.force = resultant(result, scene, driven);
-  // What rounding leaves of a couple is no force.
-  double moment = 0;
-  for (const simulate::AppliedLoad& load : result.loads) moment = std::max(moment, load.moment.norm());
-  if (!(found.force * found.size > kRounding * moment)) found.force = 0;
+  found.force = resultant(result, scene, found.size, driven);
   if (const auto bar = error_bar_of(result, simulate::ErrorBar::Of::largest_displacement))
     found.bar = bar->bar.half_width;
   const auto judge = error_bar_of(
@@ -109,10 +124,32 @@ void judge_stress(const simulate::SimulateResult& result, const simulate::Scene&
   std::vector<std::string> unknown;
   const auto near = nearest_to_strength(body, materials_of_parts(scene, body), unknown);
   if (!near || !(near->share > 0)) return;
-  if (near->share <= 1 && result.stress->lacks_bending()) return;  // it would be too good
+  if (near->nearest_share() <= 1 && result.stress->lacks_bending()) return;  // it would be too good
   found.factor = 1 / near->share;
+  if (near->layer_share && *near->layer_share > 0) found.across = 1 / *near->layer_share;
   found.limit = near->limit;
   found.limit_name = near->yields ? "yield" : "strength";
+}
+
+// A move by nothing is a support.
+void hold_what_stays(simulate::Scene& scene) {
+  for (simulate::Tie& tie : scene.get<simulate::Supports>().ties)
+    if (tie.motion.translation.isZero(0) && tie.motion.angle == 0) tie.is_move = false;
+}
+
+// Files without their folders, but for those that would have the name of another.
+std::vector<std::string> labels_of(const std::vector<std::string>& files) {
+  const auto short_name = [](const std::string& file) {
+    return std::filesystem::path(file).filename().string();
+  };
+  std::vector<std::string> labels;
+  for (const std::string& file : files) {
+    const bool other = std::any_of(files.begin(), files.end(), [&](const std::string& each) {
+      return each != file && short_name(each) == short_name(file);
+    });
+    labels.push_back(other ? file : short_name(file));
+  }
+  return labels;
 }
 
 // One part's run. A file of one part goes by the name of the first file's, so that one scene fits all.
@@ -129,13 +166,14 @@ Finding run_part(const CompareArguments& arguments, const std::string& file, std
   }
   check_parts(job, surface);
   voxelize::VoxelizeResult voxels = voxelize::voxelize(std::move(surface), job.voxelize, progress);
+  voxelize::report(voxels, progress);
   Body& body = voxels.body;
   add_actions(job, body);
+  hold_what_stays(job.scene);
   simulate::SimulateOptions options;
   options.threads = arguments.threads;
   const simulate::SimulateResult result = simulate::simulate(body, job.scene, options, progress);
   Finding found;
-  found.file = std::filesystem::path(file).filename().string();
   found.mass = result.mass;
   found.size = bounding_box(body.rest).diagonal();
   for (const Part& part : body.parts) found.volume += part.surface_volume;
@@ -144,14 +182,23 @@ Finding run_part(const CompareArguments& arguments, const std::string& file, std
   found.spacing = std::cbrt(body.parts.front().lattice.spacing.prod());
   judge_stiffness(result, job.scene, found);
   judge_stress(result, job.scene, body, found);
+  const std::vector<simulate::Material> materials = materials_of_parts(job.scene, body);
+  for (std::size_t p = 0; p < materials.size(); ++p)
+    if (const std::string line = infill_line(body.parts[p].name, materials[p]); !line.empty())
+      found.notes.push_back(line);
   found.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   return found;
 }
 
-Finding run_named(const CompareArguments& arguments, const std::string& file, std::string& name,
-                  Progress& progress) {
+// `label`: what the file is called in what is said of it.
+Finding run_named(const CompareArguments& arguments, const std::string& file, const std::string& label,
+                  std::string& name, Progress& progress) {
   try {
-    return run_part(arguments, file, name, progress);
+    HeldWarnings held;
+    Finding found = run_part(arguments, file, name, progress);
+    found.file = label;
+    found.warnings = held.take();
+    return found;
   } catch (const InputError& error) {
     if (error.where() == file) throw;
     throw InputError(file, (error.where().empty() ? "" : error.where() + ": ") + error.what());
@@ -168,11 +215,14 @@ std::string stiffness_text(double value) {
   return per_mm >= 1000 ? human_number(1e-3 * per_mm) + " kN/mm" : human_number(per_mm) + " N/mm";
 }
 
-// "2.9 against yield"; beyond some thousand the figure says no more.
-std::string factor_text(double factor, const std::string& limit) {
+// "2.9 against yield, 1.5 across layers"; beyond some thousand the figure says no more.
+std::string factor_text(const Finding& found) {
   constexpr double kMuch = 1000;
-  return fmt::format("{} against {}",
-                     factor > kMuch ? "over " + human_number(kMuch) : human_number(factor, 2), limit);
+  const auto number = [](double factor) {
+    return factor > kMuch ? "over " + human_number(kMuch) : human_number(factor, 2);
+  };
+  return fmt::format("{} against {}{}", number(*found.factor), found.limit_name,
+                     found.across ? fmt::format(", {} across layers", number(*found.across)) : "");
 }
 
 std::vector<std::pair<std::string, std::vector<std::string>>> rows_of(const std::vector<Finding>& all) {
@@ -196,8 +246,7 @@ std::vector<std::pair<std::string, std::vector<std::string>>> rows_of(const std:
   });
   add("largest von Mises stress",
       [](const Finding& f) { return f.stress ? human_pressure(*f.stress) : "-"; });
-  add("safety factor",
-      [](const Finding& f) { return f.factor ? factor_text(*f.factor, f.limit_name) : std::string("-"); });
+  add("safety factor", [](const Finding& f) { return f.factor ? factor_text(f) : std::string("-"); });
   add("cells", [](const Finding& f) {
     return fmt::format("{} of {}", human_count(f.cells), human_length(f.spacing));
   });
@@ -243,8 +292,8 @@ std::vector<std::string> verdict(const std::vector<Finding>& all) {
   for (const Finding& each : all)
     if (!each.stiffness)
       return {"no stiffness to compare: the loads of " + each.file +
-              " have no resultant, an [[indenter]] pushes, or nothing moves; compare displacements and "
-              "stresses above"};
+              " have no resultant or act against each other, heat, shrinkage or an [[indenter]] acts, or "
+              "nothing moves; compare displacements and stresses above"};
   const std::vector<std::size_t> order = order_of(all);
   std::vector<std::string> lines;
   for (std::size_t i = 0; i + 1 < order.size(); ++i) {
@@ -283,11 +332,13 @@ std::string comparison_json(const std::vector<Finding>& all) {
          {"stiffness_bar", {f.share ? json_number(f.least) : Json(), f.share ? json_number(f.most) : Json()}},
          {"von_mises", json_number(f.stress)},
          {"safety_factor", json_number(f.factor)},
+         {"safety_factor_across_layers", json_number(f.across)},
          {"limit", json_number(f.limit)},
          {"limit_is", f.limit_name},
          {"cells", f.cells},
          {"spacing", f.spacing},
-         {"seconds", f.seconds}});
+         {"seconds", f.seconds},
+         {"warnings", f.warnings}});
   const std::vector<std::size_t> stiffest = order_of(all);
   bool sure = true;
   for (std::size_t i = 0; i < stiffest.size(); ++i) {
@@ -323,11 +374,17 @@ int compare_command(int argc, char** argv) {
   Progress inner("flexel", arguments.quiet ? Progress::Mode::quiet : Progress::Mode::automatic);
   std::vector<Finding> all;
   std::string name;
-  for (const std::string& file : arguments.job.parts) {
-    progress.stage(std::filesystem::path(file).filename().string());
-    const BriefOutput bars_only(true);
-    all.push_back(run_named(arguments, file, name, inner));
-    inner.finish();
+  const std::vector<std::string>& files = arguments.job.parts;
+  const std::vector<std::string> labels = labels_of(files);
+  for (std::size_t n = 0; n < files.size(); ++n) {
+    progress.stage(labels[n]);
+    {
+      const BriefOutput bars_only(true);
+      all.push_back(run_named(arguments, files[n], labels[n], name, inner));
+      inner.finish();
+    }
+    for (const std::string& line : all.back().warnings) progress.warn(labels[n] + ": " + line);
+    for (const std::string& line : all.back().notes) progress.say(labels[n] + ": " + line);
   }
   progress.finish();
   std::string text = arguments.json ? comparison_json(all) : printable_lines(table_of(all));

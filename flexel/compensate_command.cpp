@@ -25,6 +25,7 @@
 #include "mapping/output.h"
 #include "simulate/effects/rigid.h"
 #include "simulate/indent/indenters.h"
+#include "simulate/input/side_places.h"
 #include "simulate/result/options.h"
 #include "simulate/simulate.h"
 #include "simulate/time/dynamic_relaxation.h"
@@ -153,6 +154,7 @@ class Compensation {
     check_stop();
     Surface surface = wanted_;
     surface.vertices = made_;
+    name_sides_as_wanted(surface);
     voxelize::VoxelizeOptions options = job_.voxelize;
     if (options.size) *options.size *= finer;
     voxelize::VoxelizeResult voxels = [&] {
@@ -169,6 +171,7 @@ class Compensation {
     how.threads = arguments_.threads;
     how.estimate = how.stress = false;
     (void)simulate::simulate(body, job.scene, how, simulating.inner());
+    body.surface.vertex_columns.erase(simulate::kSidePlacesColumn);
     mapping::MapOptions map;
     use_field(body, arguments_.map, map);
     ProgressStretch placing(progress_, at(kSimulated), at(1), kProgram);
@@ -177,6 +180,14 @@ class Compensation {
     body_ = std::move(body);
     last_ = std::move(mapped.result);
     warnings_ = held.take();
+  }
+
+  // Bent into the shape to be made it has the sides that it has in the shape that is wanted.
+  void name_sides_as_wanted(Surface& surface) const {
+    Column places{3, {}};
+    for (const Vec3& each : wanted_.vertices)
+      places.values.insert(places.values.end(), each.data(), each.data() + 3);
+    surface.vertex_columns[simulate::kSidePlacesColumn] = std::move(places);
   }
 
   // What is wrong with the part that was given; those made of it share that.

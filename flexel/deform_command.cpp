@@ -167,6 +167,24 @@ void plan_outputs(const DeformArguments& arguments, Plan& plan) {
   check_outputs(names, inputs, arguments.job.force);
 }
 
+// What only a written surface has.
+void refuse_unused(const DeformArguments& arguments, const Plan& plan) {
+  const bool pieces = !plan.crack.pieces.empty();
+  const auto any = [&](const auto& is) { return std::any_of(plan.outputs.begin(), plan.outputs.end(), is); };
+  if (!arguments.map.format.empty() && !pieces &&
+      !any([](const Plan::Output& output) { return output.path == "-"; }))
+    throw InputError(
+        fmt::format("--format {}: is for -o - and --pieces; a file's format is told by its extension, such "
+                    "as -o bent.{}",
+                    arguments.map.format, arguments.map.format));
+  if (arguments.map.scale != 1 && arguments.needs_output && !pieces &&
+      !any([](const Plan::Output& output) { return output.surface.has_value(); }))
+    throw InputError(
+        "--scale is for surfaces: write one with -o, such as bent.stl; bodies keep their true shape, and "
+        "flexel "
+        "picture and flexel view draw them with a --scale of their own");
+}
+
 // Nothing is asked for: a size is chosen where error bars can judge it.
 void plan_usual_goal(const DeformArguments& arguments, const CommandLine& app, Plan& plan) {
   const simulate::Scene& scene = plan.job.scene;
@@ -236,6 +254,7 @@ Plan make_plan(const DeformArguments& arguments, const CommandLine& app) {
   plan.map = map_options(arguments.map);
   plan.crack = crack_options(arguments.map);
   plan_outputs(arguments, plan);
+  refuse_unused(arguments, plan);
   plan.refine = refine_options(arguments.map, app, plan.crack);
   plan_refinement(plan);
   plan.job = plan_job(arguments.job);

@@ -46,7 +46,9 @@ void plan_lattice(const JobArguments& arguments, Job& job) {
     job.voxelize.size = parse_quantity(arguments.size, Dimension::length);
     if (!(*job.voxelize.size > 0)) throw InputError("--size: must be above zero");
   }
-  if (arguments.count && *arguments.count == 0) throw InputError("--count: must be above zero");
+  // what is below zero is a huge number here
+  if (arguments.count && static_cast<std::int64_t>(*arguments.count) <= 0)
+    throw InputError("--count: must be above zero");
   job.voxelize.count = arguments.count;
   job.voxelize.heal = voxelize::heal_choice(arguments.heal);
 }

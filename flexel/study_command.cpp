@@ -119,6 +119,7 @@ std::string whole_scene(const JobArguments& given, const simulate::Scene& file) 
     if (both) throw InputError(given.scene, fmt::format("has {} already: leave {} out", key, option));
   };
   refuse_both(!file.material.empty() && !added.scene.material.empty(), "--material", "material");
+  refuse_both(!file.model.empty() && !added.scene.model.empty(), "--model", "model");
   refuse_both(file.infill.share && added.scene.infill.share, "--infill", "infill");
   refuse_both(file.get<simulate::Gravity>().acceleration && added.scene.get<simulate::Gravity>().acceleration,
               "--gravity", "[gravity] acceleration");

@@ -61,9 +61,16 @@ struct Moved {
   std::vector<Vec3> rest, now;
 };
 
-// The rotation of the rigid motion nearest to theirs; nothing where they lie on a line.
-std::optional<Mat3> turn_of(const Moved& points) {
+// The rotation nearest to a sum of places now times those at rest; nothing where they lie on a line.
+std::optional<Mat3> turn_of(const Mat3& product) {
   constexpr double kOneLine = 1e-9;
+  const NearestRotation nearest = nearest_rotation(product);
+  if (!(nearest.values[1] > kOneLine * nearest.values[0])) return std::nullopt;
+  return nearest.rotation;
+}
+
+// That of the rigid motion nearest to theirs.
+std::optional<Mat3> turn_of(const Moved& points) {
   Vec3 middle = Vec3::Zero(), moved = Vec3::Zero();
   for (std::size_t i = 0; i < points.rest.size(); ++i) {
     middle += points.rest[i] / static_cast<double>(points.rest.size());
@@ -72,9 +79,7 @@ std::optional<Mat3> turn_of(const Moved& points) {
   Mat3 product = Mat3::Zero();
   for (std::size_t i = 0; i < points.rest.size(); ++i)
     product += (points.now[i] - moved) * (points.rest[i] - middle).transpose();
-  const NearestRotation nearest = nearest_rotation(product);
-  if (!(nearest.values[1] > kOneLine * nearest.values[0])) return std::nullopt;
-  return nearest.rotation;
+  return turn_of(product);
 }
 
 // Of the vertices of these polygons.
@@ -98,7 +103,8 @@ double turn_between(const Mat3& one, const Mat3& other, const FlexFrame& frame) 
   return between.angle() * between.axis().dot(frame.axis);
 }
 
-// rad, summed up over slices of the matter from the held end to the other: near enough to count whole turns.
+// rad, summed up over slices of the matter from the held end to the other: near enough to count whole turns. Within a slice
+// connections count, not places: those of two bars beside each other say how the pair lies.
 double turn_along(const Mat3& held, const Mat3& led, const FlexFrame& frame, const Body& body) {
   constexpr double kSlice = 1.5;  // spacings
   constexpr std::size_t kMostSlices = 200;
@@ -106,19 +112,21 @@ double turn_along(const Mat3& held, const Mat3& led, const FlexFrame& frame, con
   const double from = box.min[frame.along], way = box.max[frame.along] - from;
   double spacing = 0;
   for (const Part& part : body.parts) spacing = std::max(spacing, part.lattice.spacing.maxCoeff());
-  std::vector<Moved> slices(
+  const auto count = static_cast<double>(
       std::clamp(static_cast<std::size_t>(way / (kSlice * spacing)), std::size_t{1}, kMostSlices));
-  const auto count = static_cast<double>(slices.size());
-  for (std::size_t e = 0; e < body.rest.size(); ++e) {
-    const double share = (body.rest[e][frame.along] - from) / way;
-    Moved& slice = slices[static_cast<std::size_t>(std::clamp(share * count, 0.0, count - 0.5))];
-    slice.rest.push_back(body.rest[e]);
-    slice.now.push_back(body.position[e]);
-  }
+  std::vector<Mat3> slices(static_cast<std::size_t>(count), Mat3::Zero());
+  const Adjacency graph = element_adjacency(body);
+  for (std::uint32_t e = 0; e < body.rest.size(); ++e)
+    for (const std::uint32_t other : graph.of(e)) {
+      const double middle = (body.rest[e][frame.along] + body.rest[other][frame.along]) / 2;
+      const double slice = std::clamp((middle - from) / way * count, 0.0, count - 0.5);
+      slices[static_cast<std::size_t>(slice)] +=
+          (body.position[other] - body.position[e]) * (body.rest[other] - body.rest[e]).transpose();
+    }
   double sum = 0;
   Mat3 last = held;
-  for (const Moved& slice : slices) {
-    const std::optional<Mat3> turn = slice.rest.empty() ? std::nullopt : turn_of(slice);
+  for (const Mat3& slice : slices) {
+    const std::optional<Mat3> turn = turn_of(slice);
     if (!turn) continue;
     sum += turn_between(last, *turn, frame);
     last = *turn;

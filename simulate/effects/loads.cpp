@@ -65,7 +65,8 @@ std::vector<SurfacePoint> points_under(const Load& load, const std::vector<std::
   if (!(total_area(points) > 0))
     throw InputError(
         load.origin,
-        fmt::format("load \"{}\": no matter lies under the selected surface; use a smaller spacing",
+        fmt::format("load \"{}\": no matter lies under the selected surface; use a smaller spacing, or "
+                    "another face where this one is of a crumb that hangs on nothing",
                     load.name));
   return points;
 }

@@ -113,9 +113,10 @@ void Supports::make_link(Tie& tie, const Selected& selected, const Problem& prob
     link->middle += point.weight * point.position;
   }
   if (!(total > 0))
-    throw InputError(tie.origin, fmt::format("load \"{}\": no matter lies under what is selected; use a "
-                                             "smaller spacing",
-                                             tie.name));
+    throw InputError(tie.origin,
+                     fmt::format("load \"{}\": no matter lies under what is selected; use a smaller spacing, "
+                                 "or another face where this one is of a crumb that hangs on nothing",
+                                 tie.name));
   link->middle /= total;
   for (const LoadedPoint& point : points)
     squared += point.weight * (point.position - link->middle).squaredNorm();
@@ -137,7 +138,8 @@ void Supports::add_surface_tie(std::uint32_t tie, const std::vector<std::uint32_
   const std::vector<SurfacePoint> points = shared_evenly(problem, surface_points(problem, polygons));
   if (!(total_area(points) > 0))
     throw InputError(ties_[tie].origin,
-                     fmt::format("\"{}\": no matter lies under the selected surface; use a smaller spacing",
+                     fmt::format("\"{}\": no matter lies under the selected surface; use a smaller spacing, "
+                                 "or another face where this one is of a crumb that hangs on nothing",
                                  ties_[tie].name));
   using Matrix = decltype(TiedElements::stiffness);
   std::map<std::array<std::uint32_t, 8>, TiedElements> by_elements;

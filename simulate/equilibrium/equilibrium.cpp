@@ -229,19 +229,26 @@ double LoadStepping::out_of_proportion() const {
 void LoadStepping::refuse_load() const {
   SimulateResult told;
   mechanics_.report(trial_, told);
-  double force = 0;
-  for (const AppliedLoad& load : told.loads) force += load.force.norm();
+  constexpr double kCouple = 1e-6;  // of a moment over the size: what rounding leaves of a couple's force
+  const double diagonal = bounding_box(mechanics_.body().rest).diagonal();
+  double force = 0, moment = 0;
+  for (const AppliedLoad& load : told.loads) {
+    force += load.force.norm();
+    moment += load.moment.norm();
+  }
+  const std::string in_all = force * diagonal > kCouple * moment ? human_force(force)
+                             : moment > 0                        ? human_number(moment) + " N m"
+                                                                 : "";
   std::vector<std::string> materials;
   for (const Part& part : mechanics_.body().parts)
     if (std::find(materials.begin(), materials.end(), part.material) == materials.end())
       materials.push_back(part.material);
-  const double diagonal = bounding_box(mechanics_.body().rest).diagonal();
   throw OverloadError(fmt::format(
       "the load{} would move the part by {} at its first stiffness, {} times its size of {}: check the unit "
       "of "
       "the part (--unit), the load, and the stiffness of {}; in a scene, [run] load_steps = 10 tries it all "
       "the same",
-      force > 0 ? fmt::format(" ({} in all)", human_force(force)) : "", human_length(reach_.first),
+      in_all.empty() ? "" : fmt::format(" ({} in all)", in_all), human_length(reach_.first),
       human_count(static_cast<std::size_t>(std::min(reach_.first / diagonal, 1e15))), human_length(diagonal),
       fmt::join(materials, ", ")));
 }

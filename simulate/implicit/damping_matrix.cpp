@@ -5,8 +5,8 @@
 // rest, F C(g_a, g_b) F^T. The hourglass displacements q_m resist their rate
 // as seen by an observer that is deformed with the cell, q' = dq/dt - dF/dt F^-1 q = sum_b v_mb v_b with the weights v_mb =
 // s_mb / 8 - g_b . F^-1 q_m / 4: they add tau c_m v_ma v_mb I and, by K, tau F^-T axes [sum v_ma v_nb K_mn] axes^T F^-1.
-// A spring from a to b along the unit vector d adds tau k d
-// d^T. Each row is gathered by one thread from its cells in ascending order.
+// V is the volume of the cell's rest shape, all else as if that were the lattice's. A spring from a to b along the unit
+// vector d adds tau k d d^T, a broken one nothing. Each row is gathered by one thread from its cells in ascending order.
 #include "simulate/implicit/damping_matrix.h"
 
 #include <Eigen/Geometry>
@@ -88,8 +88,9 @@ void set_damping(const Problem& problem, const Stencil& stencil, const PaperMode
   const Body& body = problem.body;
   const std::vector<std::uint32_t> part = element_parts(body);
   std::vector<double> share = stiffness_shares(body);
-  const std::vector<double> factor = damping_factors(body);
-  for (std::size_t c = 0; c < factor.size(); ++c) share[c] *= factor[c];
+  for (const std::vector<double>& factor : {damping_factors(body), cell_factors(body, "rest_volume")})
+    for (std::size_t c = 0; c < factor.size(); ++c) share[c] *= factor[c];
+  const RestShapes rest(body);
   std::vector<CellKind> cells;
   std::vector<std::optional<SpringKind>> springs(body.parts.size());
   for (std::size_t p = 0; p < body.parts.size(); ++p) {
@@ -106,7 +107,8 @@ void set_damping(const Problem& problem, const Stencil& stencil, const PaperMode
       CellVectors u;
       for (std::size_t a = 0; a < 8; ++a) u[a] = displacement[body.cell_elements[at.cell][a]];
       const std::array<Mat3, 8> blocks =
-          springs[p] ? damping_row(*springs[p], u, at.corner) : damping_row(cells[p], u, at.corner);
+          springs[p] ? damping_row(rest.of(*springs[p], at.cell).value_or(*springs[p]), u, at.corner)
+                     : damping_row(cells[p], u, at.corner);
       const double scale = damping[p] * share[at.cell];
       for (std::size_t b = 0; b < 8; ++b) row[stencil.slot[at.cell][8 * at.corner + b]] += scale * blocks[b];
     }

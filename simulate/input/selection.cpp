@@ -21,6 +21,7 @@
 #include "base/nearest_word.h"
 #include "base/units.h"
 #include "simulate/input/part_names.h"
+#include "simulate/input/side_places.h"
 
 namespace flexel::simulate {
 namespace {
@@ -47,10 +48,20 @@ bool among(const Parts& parts, std::uint32_t part) {
   return !parts || std::binary_search(parts->begin(), parts->end(), part);
 }
 
+// m, where sides are told by.
+std::vector<Vec3> side_places(const Surface& surface) {
+  const auto found = surface.vertex_columns.find(kSidePlacesColumn);
+  if (found == surface.vertex_columns.end()) return surface.vertices;
+  std::vector<Vec3> places(surface.vertices.size());
+  for (std::size_t v = 0; v < places.size(); ++v) places[v] = Vec3(&found->second.values[3 * v]);
+  return places;
+}
+
 // Polygons of `parts` at the extreme of these together.
 std::vector<std::uint32_t> polygons_of_side(const Surface& surface, Side side, const Parts& parts) {
   double low = 1e300, high = -1e300;
-  const auto height = [&](std::uint32_t vertex) { return side.sign * surface.vertices[vertex][side.axis]; };
+  const std::vector<Vec3> places = side_places(surface);
+  const auto height = [&](std::uint32_t vertex) { return side.sign * places[vertex][side.axis]; };
   const auto wanted = [&](std::size_t p) { return among(parts, surface.polygon_part(p)); };
   for (std::size_t p = 0; p < surface.polygon_count(); ++p) {
     if (!wanted(p)) continue;
@@ -69,7 +80,7 @@ std::vector<std::uint32_t> polygons_of_side(const Surface& surface, Side side, c
       if (!(whole ? std::all_of(corners.begin(), corners.end(), reaches)
                   : std::any_of(corners.begin(), corners.end(), reaches)))
         continue;
-      const Vec3 area = area_vector(surface.vertices, corners);
+      const Vec3 area = area_vector(places, corners);
       const double facing = inside_out ? std::abs(area[side.axis]) : side.sign * area[side.axis];
       if (area.norm() > 0 && facing >= least_cosine * area.norm())
         found.push_back(static_cast<std::uint32_t>(p));

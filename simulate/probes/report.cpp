@@ -64,17 +64,22 @@ void report_effects(const std::vector<ActiveEffect>& effects, const std::string&
 void report_strays(const Fragments& fragments, SimulateResult& result, Progress& progress) {
   double volume = 0;
   std::size_t crumbs = 0;
+  const Fragment* largest = nullptr;
   for (const Fragment& fragment : fragments.list)
     if (fragment.stray) {
       ++crumbs;
+      if (!largest || fragment.volume > largest->volume) largest = &fragment;
       result.stray_cells += fragment.size;
       volume += fragment.volume;
     }
   if (crumbs > 0)
     progress.warn(fmt::format(
-        "{} loose crumb(s) of {} voxels in all ({}) hang on nothing; they are carried along with the matter "
-        "nearest to them",
-        crumbs, human_count(result.stray_cells), human_volume(volume)));
+        "{} loose crumb(s) of {} voxels in all ({}) hang on nothing, the largest near ({}, {}, {}); they are "
+        "carried along with the matter nearest to them, and bear nothing; where they are of the part, let "
+        "them "
+        "overlap with it in its file, else take them out there",
+        crumbs, human_count(result.stray_cells), human_volume(volume), human_length(largest->centre.x()),
+        human_length(largest->centre.y()), human_length(largest->centre.z())));
 }
 
 void report_following(bool alone, Progress& progress) {

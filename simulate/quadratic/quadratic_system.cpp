@@ -108,9 +108,10 @@ void QuadraticSystem::place_support(const Tie& tie, const Selected& selected) {
     support.points =
         in_firm_cells(problem_.body, nodes_, face_points(problem_, nodes_, selected.polygons, box()));
     if (support.points.empty() && cut_.surroundings == nullptr)
-      throw InputError(tie.origin, fmt::format("\"{}\": no matter lies under the selected surface; use a "
-                                               "smaller spacing",
-                                               tie.name));
+      throw InputError(
+          tie.origin, fmt::format("\"{}\": no matter lies under the selected surface; use a smaller spacing, "
+                                  "or another face where this one is of a crumb that hangs on nothing",
+                                  tie.name));
   }
   std::vector<std::uint8_t> chosen(problem_.body.element_count(), 0);
   for (const std::uint32_t e : selected.elements) chosen[e] = 1;
@@ -318,10 +319,11 @@ void QuadraticSystem::place_loads(const std::vector<Load>& loads) {
                    load.torque.has_value() || load.at.has_value()};
     const std::vector<FacePoint> points = face_points(problem_, nodes_, selected.polygons, box());
     if (points.empty() && cut_.surroundings == nullptr)
-      throw InputError(load.origin,
-                       fmt::format("load \"{}\": no matter lies under the selected surface; use a "
-                                   "smaller spacing",
-                                   load.name));
+      throw InputError(
+          load.origin,
+          fmt::format("load \"{}\": no matter lies under the selected surface; use a smaller spacing, or "
+                      "another face where this one is of a crumb that hangs on nothing",
+                      load.name));
     if (cut_.surroundings == nullptr) check_area(load, selected.polygons, points);
     for (const std::uint32_t p : selected.polygons) pressure_[p] += load.pressure.value_or(kUnknownPressure);
     std::vector<LoadedPoint> loaded;

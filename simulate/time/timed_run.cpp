@@ -21,6 +21,7 @@
 #include "formats/lattice/body_file.h"
 #include "formats/lattice/fused_points.h"
 #include "simulate/contact/pairs/stuck_places.h"
+#include "simulate/effects/bonds.h"
 #include "simulate/effects/contact.h"
 #include "simulate/effects/supports.h"
 #include "simulate/events/adaptive_resolution.h"
@@ -55,8 +56,9 @@ constexpr std::size_t kRows = 1000;  // of the history, unless the scene says ot
 constexpr std::size_t kFrames = 50;  // likewise
 constexpr double kSameTime = 1e-12;  // share of a time
 
-// (parts) 1: a [[fix]] or a [[move]] has some of it.
-std::vector<std::uint8_t> held_parts(const Scene& scene, const Body& body) {
+// (parts) 1: a [[fix]] or a [[move]] has some of it, or of a part that it is bonded to, through others too.
+std::vector<std::uint8_t> held_parts(const Scene& scene, const Problem& problem) {
+  const Body& body = problem.body;
   std::vector<std::uint8_t> held(body.parts.size());
   const std::vector<std::uint32_t> part = element_parts(body);
   const EffectParameters present = without_coming_parts(scene, body);
@@ -64,6 +66,16 @@ std::vector<std::uint8_t> held_parts(const Scene& scene, const Body& body) {
     const Selected selected = resolve(tie.where, body);
     for (const std::uint32_t e : selected.elements) held[part[e]] = 1;
     for (const std::uint32_t p : selected.polygons) held[body.surface.polygon_part(p)] = 1;
+  }
+  const std::optional<Bonds> bonds = Bonds::make(present.get<Bonds>(), problem);
+  for (bool spreads = bonds.has_value(); spreads;) {
+    spreads = false;
+    for (std::uint32_t p = 0; p < held.size(); ++p)
+      for (std::uint32_t other = 0; other < held.size() && held[p] == 0; ++other)
+        if (held[other] != 0 && bonds->holds(p, other, body)) {
+          held[p] = 1;
+          spreads = true;
+        }
   }
   return held;
 }
@@ -484,7 +496,7 @@ void TimedRun::keep_motion(const CarriedMotion& carried, const Event& event,
   const std::string what = carried.change_of_energy(
       problem, segment_->state(), stored, adaptive_ ? adaptive_->energy_borne() : kLargestEnergyChange,
       event.origin, progress_);
-  carried.warn_of_spin(problem, segment_->state(), held_parts(scene_, body_), event.origin, progress_);
+  carried.warn_of_spin(problem, segment_->state(), held_parts(scene_, problem), event.origin, progress_);
   if (!what.empty()) progress_.say(fmt::format("at {:.4g} s {}", event.at, what));
 }
 

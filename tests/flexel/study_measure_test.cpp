@@ -1,9 +1,15 @@
 // References, errors, the frontier and the sentences of a study, on numbers that are known.
 #include "flexel/study/accuracy_analysis.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
+#include <fstream>
+
+#include "base/error.h"
+#include "flexel/study/runs/surfaces.h"
 
 namespace flexel::study {
 namespace {
@@ -12,6 +18,30 @@ std::vector<study::SizeValue> sequence(double limit, double factor, double order
   std::vector<study::SizeValue> values;
   for (const double h : sizes) values.push_back({h, limit + factor * std::pow(h, order)});
   return values;
+}
+
+// Two triangles in mm: of the same vertices, along the one diagonal or the other.
+std::string square(const std::string& name, double height, const std::string& triangles) {
+  std::string path = ::testing::TempDir() + name;
+  std::ofstream(path)
+      << "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\n"
+         "property double z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n"
+      << fmt::format("0 0 {0}\n10 0 {0}\n10 10 {0}\n0 10 {0}\n", height) << triangles;
+  return path;
+}
+
+TEST(StudyMeasure, DistancesOfSurfacesAreOfOneMesh) {
+  const std::string one = "3 0 1 2\n3 0 2 3\n", other = "3 0 1 3\n3 1 2 3\n";
+  const std::string low = square("study-low.ply", 0, one), high = square("study-high.ply", 0.5, one),
+                    across = square("study-across.ply", 0.5, other);
+  const Deadline late = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  EXPECT_NEAR(surface_distance(high, low, late).rms, 0.5e-3, 1e-12);
+  try {
+    (void)surface_distance(across, low, late);
+    FAIL() << "points of other triangles are compared";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("--edge"), std::string::npos) << error.what();
+  }
 }
 
 TEST(StudyMeasure, RichardsonFindsTheLimitAndTheOrder) {

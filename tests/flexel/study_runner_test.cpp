@@ -1,12 +1,14 @@
 // Whole runs. The programs lie beside this one; where they are not built the runs are skipped.
 #include "flexel/study/runs/runner.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
 
 #include "base/error.h"
 #include "base/program/own_program.h"
+#include "flexel/study/runs/surfaces.h"
 #include "formats/exchange/surface_file.h"
 
 namespace flexel::study {
@@ -65,6 +67,25 @@ class StudyRuns : public testing::Test {
   study::Configuration wanted_;
   study::RunOptions options_;
 };
+
+// The same bar in inches, under the same forces: what its surfaces are apart is so much less as it is larger.
+TEST_F(StudyRuns, DistancesOfSurfacesAreInTheirPartsUnit) {
+  std::vector<double> apart;
+  for (const auto& [unit, metres] : {std::pair{"mm", 1e-3}, std::pair{"in", 25.4e-3}}) {
+    case_.voxelize_options = {"--unit", unit, "--edge", std::string("5 ") + unit};
+    std::vector<fs::path> surfaces;
+    for (const double size : {5.0, 2.5}) {
+      wanted_.size = size * metres;
+      surfaces.push_back(folder_.path() / fmt::format("{}-{}.ply", unit, size));
+      options_.surface = surfaces.back();
+      const study::RunResult run = run_configuration(case_, wanted_, options_);
+      ASSERT_TRUE(run.ok()) << run.failure;
+    }
+    apart.push_back(surface_distance(surfaces[0].string(), surfaces[1].string(), kNever).rms * metres);
+  }
+  EXPECT_GT(apart[0], 0);
+  EXPECT_NEAR(apart[1] / apart[0], 1, 1e-3);
+}
 
 TEST_F(StudyRuns, EquilibriumGivesItsFigures) {
   options_.surface = folder_.path() / "bent.ply";

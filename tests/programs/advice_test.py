@@ -253,5 +253,20 @@ def test_damaged_step():
     expect("compare their volume" in told.err, told.err)
 
 
+def test_a_crumb_that_hangs_on_nothing():
+    """It bears nothing; a face of it is refused, and what the messages say of it helps."""
+    def part_with(x, y, z):
+        return write("part.stl", binary_stl(box_triangles((80, 20, 10)) + shifted(box_triangles((1.5, 1.5, 1.5)), x, y, z)))
+    pushed = ("part.stl", *ON_BOX, "--push")
+    part_with(40, 10, 14)
+    told = says(deform(*pushed, "xmax: 0 0 -50 N"), "loose crumb(s)", "mm, ", "let them overlap with it in its file, else take them out")
+    expect("the largest near (4" in told.err, told.err)  # mm
+    expect_error(deform(*pushed, "zmax: 0 0 -50 N"), "flexel", "no matter lies under", "another face")
+    part_with(40, 10, 9.5)
+    silent(deform(*pushed, "zmax: 0 0 -50 N"), "crumb")
+    write("part.stl", binary_stl(box_triangles((80, 20, 10))))
+    silent(deform(*pushed, "zmax: 0 0 -50 N"), "crumb")
+
+
 if __name__ == "__main__":
     main(globals())

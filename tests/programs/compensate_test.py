@@ -3,6 +3,7 @@
 import json
 import math
 import pathlib
+import re
 
 from harness import ascii_stl, box_triangles, expect, expect_error, expect_ok, expect_only, main, run
 
@@ -99,6 +100,21 @@ def test_a_part_on_stdout_is_refused():
     done = run("flexel", "compensate", "shelf.stl", *SAG, "--size", "3mm", "-o", "-")
     expect_error(done, "flexel", "-o -", "make.stl")
     expect("--format" not in done.err, done)
+
+
+def test_a_side_is_that_of_the_shape_that_is_wanted():
+    """The top of a shelf that is made bent up would be its tip: what presses on "zmax" presses on the whole top, as on the face by its number."""
+    size = (80.0, 10.0, 3.0)
+    pathlib.Path("shelf.stl").write_bytes(ascii_stl(box_triangles(size)))
+    how = ["--fix", "xmin", "--material", "PLA", "--model", "quadratic", "--size", "3mm", "--ascii", "--quiet"]
+    faces = re.findall(r"(\S+/\d+) .*normal \+z", expect_ok(run("flexel", "info", "shelf.stl")).out.decode())
+    for where, out in (("zmax", "side.stl"), (faces[0], "face.stl")):
+        expect_ok(run("flexel", "compensate", "shelf.stl", *how, "--push", f"{where}: 0 0 -2 N", "-o", out, "--summary", "s.json"))
+        expect(json.loads(pathlib.Path("s.json").read_text())["remaining_share"] < 0.01, where)
+    apart = max(math.dist(a, b) for a, b in zip(vertices("side.stl"), vertices("face.stl")))
+    expect(apart < 1e-5, f"{apart} mm")
+    made = expect_ok(run("flexel", "compensate", "shelf.stl", *how, "-o", "make.vtu", "--push", "zmax: 0 0 -2 N"))
+    expect(b"side_places" not in pathlib.Path("make.vtu").read_bytes(), made)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 
 from harness import bracket, box, expect, expect_error, expect_ok, main, run, scene, write
 from picture_test import colours, read_png
@@ -220,6 +221,42 @@ def test_fillets_are_no_holes():
     for face in found["files"][0]["parts"][0]["faces"]:
         if face["kind"] == "round":
             expect(face["hole"] is False or face["angle"] > 3, face)
+
+
+def compared(*words):
+    result = expect_ok(run("flexel", "compare", "a.stl", "b.stl", "--material", "steel", "--size", "2.5 mm", "--json", *words))
+    return json.loads(result.out), result.err
+
+
+def test_forces_against_each_other_give_no_stiffness():
+    """What rounding leaves of two moves that press a part from both ends, or of loads, is no force; nor is heat's displacement one."""
+    write("a.stl", binary_stl(box_triangles((40, 10, 10))))
+    write("b.stl", binary_stl(box_triangles((40, 10, 12))))
+    middle = '{ box = { min = ["15 mm", "2 mm", "2 mm"], max = ["25 mm", "8 mm", "8 mm"] } }'
+    for name, text in (("heat", '[thermal]\nchange = "50 K"\n'), ("shrinkage", '[shrinkage]\nlayer = "0.2 mm"\nalong = "-0.3 %"\nacross = "-0.2 %"\n')):
+        write(f"{name}.toml", '[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = ["0 N", "0 N", "-100 N"]\n' + text)
+    for words in (["--fix", middle, "--move", "xmin: 0.01 0 0 mm", "--move", "xmax: -0.01 0 0 mm"],
+                  ["--fix", middle, "--push", "xmin: 100 N", "--push", "xmax: 101 N"], ["--scene", "heat.toml"], ["--scene", "shrinkage.toml"]):
+        found, _ = compared(*words)
+        expect(all(each["stiffness"] is None and each["largest_displacement"] > 0 for each in found["parts"]) and not found["sure"], found)
+    # what is moved by nothing is held: the load is what acts
+    found, _ = compared("--fix", "xmin", "--move", "xmax: 0 0 0 mm", "--push", "zmax: 0 0 -100 N")
+    for each in found["parts"]:
+        expect(abs(each["force"] - 100) < 1e-6 and abs(each["stiffness"] * each["largest_displacement"] / 100 - 1) < 1e-9, found)
+
+
+def test_compare_says_of_which_file_it_speaks():
+    """Warnings of a part are told, as flexel deform tells them; files of one name keep their folders."""
+    write("a.stl", binary_stl(box_triangles((40, 10, 10))))
+    write("b.stl", binary_stl([triangle[::-1] for triangle in box_triangles((40, 10, 10))]))
+    case = ["--fix", "xmin", "--push", "xmax: 0 0 -100 N"]
+    found, err = compared(*case)
+    expect(found["parts"][0]["warnings"] == [] and any("inside out" in line for line in found["parts"][1]["warnings"]), found)
+    expect("warning: b.stl: " in err and "warning: a.stl: " not in err, err)
+    os.mkdir("new")
+    write("new/a.stl", binary_stl(box_triangles((40, 10, 12))))
+    both = expect_ok(run("flexel", "compare", "a.stl", "new/a.stl", "--material", "steel", "--size", "1.25 mm", *case)).out.decode()
+    expect("new/a.stl is" in both and "times as stiff as a.stl" in both, both)
 
 
 if __name__ == "__main__":

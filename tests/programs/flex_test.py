@@ -132,5 +132,16 @@ def test_what_cannot_be_is_one_line():
     expect(not pathlib.Path("bent.stl").exists(), "something was written")
 
 
+def test_two_bars_beside_each_other_turn_as_one_does():
+    """Bent to one arc they end up through each other, so that where they lie beside each other says nothing of how they turn."""
+    upper = [[(x, y, z + 15) for x, y, z in triangle] for triangle in box_triangles((80.0, 20.0, 5.0))]
+    pathlib.Path("low.stl").write_bytes(ascii_stl(box_triangles((80.0, 20.0, 5.0)), "low"))
+    pathlib.Path("high.stl").write_bytes(ascii_stl(upper, "high"))
+    expect_ok(run("flexel", "flex", "low.stl", "high.stl", "--bend", "90 deg", "--material", "PLA", "--size", "2mm", "--no-estimate", "--quiet", "-o", "bent.stl",
+                  "--summary", "s.json"))
+    told = math.degrees(json.loads(pathlib.Path("s.json").read_text())["flex"]["angle"])
+    expect(abs(told - 90) < 1, told)
+
+
 if __name__ == "__main__":
     main(globals())

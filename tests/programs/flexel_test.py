@@ -68,6 +68,8 @@ def test_edge_splits_meshes_of_every_format():
         expect("were split" not in whole.err, "short enough already")
     expect_error(run("flexel-voxelize", "box.obj", "--edge", "1 um", "-o", "x.vtu"), "flexel-voxelize", "box.obj", "larger --edge")
     expect_error(run("flexel", "deform", "box.obj", *CASE, "--edge", "0 mm", "-o", "x.stl"), "flexel", "--edge")
+    below = run("flexel", "deform", "box.obj", "--material", "steel", "--fix", "xmin", "--gravity", "1 g", "--count", "-5", "-o", "x.stl")
+    expect_error(below, "flexel", "--count: must be above zero")
 
 
 def test_deform_equals_the_pipe():
@@ -174,6 +176,20 @@ def test_commands():
     expect_error(run("flexel", "defrom"), "flexel", "did you mean \"deform\"")
     expect_error(run("flexel", "map", "absent.vtu", "--format", "stl"), "flexel-map", "absent.vtu")
     expect(not os.listdir("."), "nothing written")
+
+
+def test_options_that_nothing_takes_are_refused():
+    """The body that -o x.vtu writes has its true shape, and a file's extension tells its format."""
+    box()
+    case = ["box.stl", *CASE, "--force"]
+    for out in ("x.vtu", "x.png", "x.html"):
+        expect_error(run("flexel", "deform", *case, "--scale", "10", "-o", out), "flexel", "--scale is for surfaces", "bent.stl")
+    expect_error(run("flexel", "deform", *case, "--format", "obj", "-o", "x.stl"), "flexel", "--format obj", "-o bent.obj")
+    expect_ok(run("flexel", "deform", *case, "--scale", "10", "-o", "x.vtu", "-o", "x.stl"))
+    expect_ok(run("flexel", "deform", *case, "-o", "bent.obj", "--format", "stl", "-o", "-"))
+    write("m.toml", 'model = "cells"\n')
+    refused = run("flexel", "study", "box.stl", "--scene", "m.toml", "--model", "springs", "--material", "steel", "--gravity", "1 g", "-o", "st")
+    expect_error(refused, "flexel", "m.toml: has model already: leave --model out")
 
 
 if __name__ == "__main__":

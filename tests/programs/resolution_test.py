@@ -192,6 +192,20 @@ def test_a_spin_that_is_another_on_a_coarser_lattice_is_told():
         expect(('part "cube" spins 25 % slower' in told) == warned, told)
 
 
+def test_what_is_bonded_to_a_held_part_does_not_spin():
+    """A cube on a plate that is held: it turns a little, and its moment of inertia on another lattice says nothing."""
+    plate = [[(x, y, z - 5) for x, y, z in triangle] for triangle in box_triangles((20, 20, 5))]
+    write("plate.stl", binary_stl(plate))
+    write("cube.stl", binary_stl(box_triangles((20, 20, 20))))
+    expect_ok(run("flexel-voxelize", "cube.stl", "plate.stl", "--size", "5 mm", "-o", "both.vtu"))
+    turned = ('[[velocity]]\nwhere = "cube"\nspin = { axis = [0, 0, 1], through = ["10 mm", "10 mm", "10 mm"], angle_per_second = "3600 deg" }\n'
+              '[run]\ntime = "1 ms"\n[[event]]\nat = "0.5 ms"\ndo = "resolution"\npart = "cube"\nchange = "coarser"\n')
+    for apart, warned in (("", False), ("bond = false\n", True)):
+        write("scene.toml", apart + GUM.replace("xmin", "plate/zmin") + turned)
+        told = expect_ok(run("flexel-simulate", "scene.toml", "both.vtu", "-o", "out.vtu", "--force")).err
+        expect(('part "cube" spins' in told) == warned, told)
+
+
 def test_a_resumed_run_that_meets_a_floor_has_the_same_bytes():
     """It becomes finer before it touches, bounces, and is as it was at the end; explicit steps, and implicit ones."""
     bent_bar("5 mm")

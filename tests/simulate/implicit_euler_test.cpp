@@ -15,6 +15,7 @@
 #include "simulate/effects/initial_velocity.h"
 #include "simulate/effects/plasticity.h"
 #include "simulate/implicit/damping_matrix.h"
+#include "simulate/models/set_rest_shape.h"
 #include "simulate/time/energy_history.h"
 #include "tests/simulate/law_materials.h"
 #include "tests/simulate/stepped.h"
@@ -65,6 +66,43 @@ TEST(DampingMatrix, IsTheKernelsDamping) {
     EXPECT_GT(largest, 0);
     for (std::size_t e = 0; e < pulled.size(); ++e)
       EXPECT_LT((pulled[e] + stepper.damping_force()[e]).norm(), 1e-11 * largest) << e;
+  }
+}
+
+// Cells whose rest shape is another than the lattice's, in volume too, and springs that are broken.
+TEST(DampingMatrix, IsTheKernelsDampingOfOtherRestShapes) {
+  for (const Model model : {Model::cells, Model::springs}) {
+    BoxOptions options;
+    options.cells = {3, 2, 2};
+    Body body = box_body(options);
+    const Problem problem = testing::problem_of(body, Material{"gum", 1e6, 0.25, 1000, "test"}, model);
+    renormalise_all(body, problem, testing::random_displacements(body, 0.05, 3));
+    if (model == Model::springs) {
+      body.cell_columns["broken_springs"] = {1, std::vector<double>(body.cell_count(), 0)};
+      body.cell_columns["broken_springs"].values[4] = 0b1011;
+    }
+    KernelEffects plan{{3e-4}};
+    plan.rest_shapes = true;
+    plan.broken_springs = model == Model::springs;
+    Stepper stepper(problem, plan, true, "");
+    stepper.read_memory(body.cell_columns);
+    State state = testing::at_rest(body);
+    state.displacement = testing::random_displacements(body, 0.05, 1);
+    state.velocity = testing::random_displacements(body, 1, 2);
+    const std::vector<Vec3> velocity = state.velocity;
+    const StiffnessPattern pattern =
+        stiffness_pattern(body, active_cells(problem), connection_rows({}, body.element_count()));
+    BlockMatrix matrix = pattern.matrix;
+    set_damping(problem, pattern.stencil, PaperModel(problem), plan.damping, state.displacement, matrix);
+    std::vector<Vec3> pulled(body.element_count());
+    multiply(matrix, velocity, pulled);
+    (void)stepper.advance(state, {}, {0, 0, false});
+    double largest = 0, missed = 0;
+    for (const Vec3& force : stepper.damping_force()) largest = std::max(largest, force.norm());
+    for (std::size_t e = 0; e < pulled.size(); ++e)
+      missed = std::max(missed, (pulled[e] + stepper.damping_force()[e]).norm());
+    EXPECT_GT(largest, 0);
+    EXPECT_LT(missed, 1e-11 * largest);
   }
 }
 

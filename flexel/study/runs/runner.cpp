@@ -213,8 +213,8 @@ class Run {
 
   void map() {
     const std::string surface = options_.surface.empty() ? file("surface.ply") : options_.surface.string();
-    if (!run("flexel-map",
-             {file("bent.vtu"), "--method", wanted_.method, "--report", file("map.json"), "-o", surface}))
+    if (!run("flexel-map", {file("bent.vtu"), "--method", wanted_.method, "--unit", "mm", "--report",
+                            file("map.json"), "-o", surface}))
       return;
     add("read", log_.stages["read"]);
     add("map", log_.stages["map"]);

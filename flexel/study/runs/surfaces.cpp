@@ -15,14 +15,19 @@
 namespace flexel::study {
 namespace {
 
+// In mm, whatever the part's file is in.
 Surface read(const std::string& path) {
-  return import_surface(path);
+  ImportOptions options;
+  options.unit = 1e-3;
+  return import_surface(path, options);
 }
 
 void check_same_mesh(const Surface& surface, const Surface& finest, const std::string& path) {
-  if (surface.vertices.size() != finest.vertices.size())
-    throw InputError(path, fmt::format("{} vertices, the finest surface has {}", surface.vertices.size(),
-                                       finest.vertices.size()));
+  if (surface.vertices.size() != finest.vertices.size() ||
+      surface.polygon_vertices != finest.polygon_vertices)
+    throw InputError(path, fmt::format("{} vertices, the finest surface has {}: large triangles are split as "
+                                       "each run bends them; --edge LENGTH splits them alike, before",
+                                       surface.vertices.size(), finest.vertices.size()));
 }
 
 }  // namespace

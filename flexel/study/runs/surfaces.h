@@ -6,7 +6,7 @@
 
 namespace flexel::study {
 
-// Distances of the mapped surface `path` from `finest` (both .ply of the same part): the root mean square, over
+// Distances of the mapped surface `path` from `finest` (both .ply of the same part, in mm): the root mean square, over
 // the area, of the distance between the same material points, and the Hausdorff distance (hausdorff.h), computed
 // until `deadline`. Throws InputError where the surfaces do not correspond.
 struct SurfaceDistance {
