@@ -17,6 +17,7 @@
 #include "formats/lattice/cell_moments.h"
 #include "formats/lattice/fused_points.h"
 #include "formats/lattice/quadratic_field.h"
+#include "formats/pieces/other_pieces.h"
 #include "simulate/estimate/coarse_grid.h"
 #include "simulate/estimate/coarse_moments.h"
 #include "simulate/matter/joined_parts.h"
@@ -375,6 +376,7 @@ std::vector<Vec3> prolonged_displacement(const Coarsening& coarse, const Body& f
 double share_of_thin_walls(const Body& body, double cells) {
   const FacePairs pairs = face_pairs(body);
   std::vector<double> thinnest(body.cell_count(), 1e300);
+  double unsure = 0;  // that go on where this process has no cells
   for (const auto& along : pairs) {
     std::vector<std::uint32_t> next(body.cell_count(), ~0u);
     std::vector<std::uint8_t> has_previous(body.cell_count(), 0);
@@ -385,16 +387,27 @@ double share_of_thin_walls(const Body& body, double cells) {
     for (std::uint32_t c = 0; c < body.cell_count(); ++c) {
       if (has_previous[c]) continue;
       double thickness = 0;
-      for (std::uint32_t at = c; at != ~0u; at = next[at]) thickness += body.fill[at];
+      bool goes_on = false, counts = false;
+      for (std::uint32_t at = c; at != ~0u; at = next[at]) {
+        thickness += body.fill[at];
+        goes_on |= other_pieces() && other_pieces()->is_outermost(at);
+        counts |= counts_cell(at);
+      }
+      if (goes_on && counts && thickness < cells) ++unsure;
       for (std::uint32_t at = c; at != ~0u; at = next[at]) thinnest[at] = std::min(thinnest[at], thickness);
     }
   }
+  if (over_pieces(unsure) > 0)
+    throw WholeBodyNeeded(
+        "walls of it are so little filled that two cells beside a piece do not tell their thickness");
   double thin = 0, all = 0;
-  for (std::size_t c = 0; c < body.cell_count(); ++c) {
-    if (body.broken[c]) continue;
+  for (std::uint32_t c = 0; c < body.cell_count(); ++c) {
+    if (body.broken[c] || !counts_cell(c)) continue;
     all += body.fill[c];
     if (thinnest[c] < cells * (1 - 1e-9)) thin += body.fill[c];
   }
+  thin = over_pieces(thin);
+  all = over_pieces(all);
   return all > 0 ? thin / all : 0;
 }
 
