@@ -142,6 +142,8 @@ void SharedBody::number_elements() {
     all &= values[e] >= 0;
   }
   ok(VecRestoreArrayRead(found, &values));
+  around_.point = {};  // as all are known by their numbers
+  around_.piece = {};
   refuse_if(*this, !all, "elements of it are of no cell");
 }
 

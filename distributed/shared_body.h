@@ -51,7 +51,6 @@ class SharedBody : public OtherPieces {
   [[nodiscard]] bool is_first() const override { return rank() == 0; }
   [[nodiscard]] bool owns_element(std::uint32_t element) const override { return owns_[element] != 0; }
   [[nodiscard]] bool owns_cell(std::uint32_t cell) const override { return around_.ring[cell] == 0; }
-  [[nodiscard]] bool is_outermost(std::uint32_t cell) const override { return around_.ring[cell] == 2; }
   [[nodiscard]] const std::vector<std::uint8_t>& polygons_with_cells() const override { return with_cells_; }
   [[nodiscard]] const std::vector<std::uint8_t>& own_vertices() const override { return own_vertices_; }
   [[nodiscard]] const Box& box() const override { return box_; }

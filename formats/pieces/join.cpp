@@ -141,8 +141,9 @@ class Joiner {
     const std::vector<std::uint32_t> part = cell_parts(from);
     std::vector<bool> kept(from.cell_count());
     for (std::size_t c = 0; c < kept.size(); ++c)
-      kept[c] = !piece.ghost_cells[c] && (!near_ || (*near_)[part[c]].has(voxel_of(from, c)));
-    add_elements(piece, used_by(from, kept), false);
+      kept[c] = !near_ || (*near_)[part[c]].has(voxel_of(from, c));
+    add_elements(piece, used_by(from, kept), false);  // some of a piece's own are of ghosts alone
+    for (std::size_t c = 0; c < kept.size(); ++c) kept[c] = kept[c] && !piece.ghost_cells[c];
     add_cells(piece, kept, part);
   }
 

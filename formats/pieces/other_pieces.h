@@ -42,9 +42,8 @@ class OtherPieces {
   [[nodiscard]] virtual bool is_first() const = 0;  // of all processes
   [[nodiscard]] virtual bool owns_element(std::uint32_t element) const = 0;
   [[nodiscard]] virtual bool owns_cell(std::uint32_t cell) const = 0;
-  [[nodiscard]] virtual bool is_outermost(std::uint32_t cell) const = 0;  // others beside it are not here
   [[nodiscard]] virtual const std::vector<std::uint8_t>& polygons_with_cells()
-      const = 0;  // (polygons) of any piece
+      const = 0;                                     // (polygons) of any piece
   [[nodiscard]] virtual const Box& box() const = 0;  // m, of the whole body's elements at rest
   [[nodiscard]] virtual std::size_t elements() const = 0;
   [[nodiscard]] virtual std::size_t cells() const = 0;

@@ -224,6 +224,7 @@ double LoadStepping::out_of_proportion() const {
   apply(mechanics_.constraints(), mechanics_.body(), whole, whole.displacement);
   double largest = whole_box(mechanics_.body()).diagonal();
   for (const Vec3& moved : whole.displacement) largest = std::max(largest, moved.norm());
+  if (other_pieces()) (void)other_pieces()->take_of_largest(largest, std::span(&largest, 1));
   return kOutOfProportion * largest;
 }
 

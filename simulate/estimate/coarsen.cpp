@@ -373,11 +373,12 @@ std::vector<Vec3> prolonged_displacement(const Coarsening& coarse, const Body& f
   return moved;
 }
 
-double share_of_thin_walls(const Body& body, double cells) {
-  const FacePairs pairs = face_pairs(body);
+namespace {
+
+// (cells) The thinnest wall of a cell, in cells: along an axis, the fills of the cells in a row.
+std::vector<double> thinnest_walls(const Body& body) {
   std::vector<double> thinnest(body.cell_count(), 1e300);
-  double unsure = 0;  // that go on where this process has no cells
-  for (const auto& along : pairs) {
+  for (const auto& along : face_pairs(body)) {
     std::vector<std::uint32_t> next(body.cell_count(), ~0u);
     std::vector<std::uint8_t> has_previous(body.cell_count(), 0);
     for (const auto& [low, high] : along) {
@@ -387,19 +388,62 @@ double share_of_thin_walls(const Body& body, double cells) {
     for (std::uint32_t c = 0; c < body.cell_count(); ++c) {
       if (has_previous[c]) continue;
       double thickness = 0;
-      bool goes_on = false, counts = false;
-      for (std::uint32_t at = c; at != ~0u; at = next[at]) {
-        thickness += body.fill[at];
-        goes_on |= other_pieces() && other_pieces()->is_outermost(at);
-        counts |= counts_cell(at);
-      }
-      if (goes_on && counts && thickness < cells) ++unsure;
+      for (std::uint32_t at = c; at != ~0u; at = next[at]) thickness += body.fill[at];
       for (std::uint32_t at = c; at != ~0u; at = next[at]) thinnest[at] = std::min(thinnest[at], thickness);
     }
   }
-  if (over_pieces(unsure) > 0)
-    throw WholeBodyNeeded(
-        "walls of it are so little filled that two cells beside a piece do not tell their thickness");
+  return thinnest;
+}
+
+// At cells of others' the values that they have. A cell is known by its first element.
+void exchange_at_cells(const Body& body, std::vector<Vec3>& values) {
+  std::vector<Vec3> at_elements(body.element_count(), Vec3::Zero());
+  for (std::uint32_t c = 0; c < body.cell_count(); ++c)
+    if (counts_cell(c)) at_elements[body.cell_elements[c][0]] += values[c];
+  other_pieces()->sum_at_elements(at_elements);
+  for (std::uint32_t c = 0; c < body.cell_count(); ++c)
+    if (!counts_cell(c)) values[c] = at_elements[body.cell_elements[c][0]];
+}
+
+// (cells) As far as own ones go, of a body in pieces: a row may go on through several. No more than `most` is told apart.
+std::vector<double> thinnest_walls_over_pieces(const Body& body, double most) {
+  const FacePairs pairs = face_pairs(body);
+  std::vector<std::uint8_t> used(body.element_count(), 0);
+  double twice = 0;
+  for (const auto& elements : body.cell_elements) twice += used[elements[0]]++;
+  if (over_pieces(twice) > 0) throw WholeBodyNeeded("two cells in one voxel share an element of it");
+  std::vector<Vec3> after(body.cell_count()),
+      before(body.cell_count());  // of the row, the cell with it, by axis
+  for (std::size_t c = 0; c < after.size(); ++c) after[c] = before[c] = Vec3::Constant(body.fill[c]);
+  for (double changed = 1; changed > 0;) {
+    changed = 0;
+    const auto extend = [&](Vec3& to, const Vec3& by, std::uint32_t cell, Eigen::Index axis) {
+      const double reached = std::min(most, body.fill[cell] + by[axis]);
+      if (!counts_cell(cell) || !(reached > to[axis])) return;
+      to[axis] = reached;
+      ++changed;
+    };
+    for (std::size_t a = 0; a < pairs.size(); ++a) {
+      const auto axis = static_cast<Eigen::Index>(a);
+      for (const auto& [low, high] : pairs[a]) extend(before[high], before[low], high, axis);
+      for (auto pair = pairs[a].rbegin(); pair != pairs[a].rend(); ++pair)
+        extend(after[(*pair)[0]], after[(*pair)[1]], (*pair)[0], axis);
+    }
+    exchange_at_cells(body, after);
+    exchange_at_cells(body, before);
+    changed = over_pieces(changed);
+  }
+  std::vector<double> thinnest(body.cell_count());
+  for (std::size_t c = 0; c < thinnest.size(); ++c)
+    thinnest[c] = (after[c] + before[c]).minCoeff() - body.fill[c];
+  return thinnest;
+}
+
+}  // namespace
+
+double share_of_thin_walls(const Body& body, double cells) {
+  const std::vector<double> thinnest =
+      other_pieces() ? thinnest_walls_over_pieces(body, 2 * cells) : thinnest_walls(body);
   double thin = 0, all = 0;
   for (std::uint32_t c = 0; c < body.cell_count(); ++c) {
     if (body.broken[c] || !counts_cell(c)) continue;
