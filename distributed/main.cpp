@@ -43,9 +43,10 @@ struct Arguments {
 void declare(CommandLine& app, Arguments& arguments) {
   arguments.options.threads = 1;
   app.add_option("scene", arguments.scene, "Scene file (TOML; docs/reference/scene.md gives every key)");
-  app.add_option(
-      "body", arguments.body,
-      "Body file, or a list of pieces (.pvtu); rank 0 reads it and cuts it anew, a slab for each rank");
+  app.add_option("body", arguments.body,
+                 "Body file, which rank 0 cuts, a slab for each rank; or a list of pieces (.pvtu), of which "
+                 "each rank has its own where "
+                 "docs/guide/mpi.md says so");
   app.add_option("-o,--output", arguments.output, "Deformed body (.vtu), in pieces (.pvtu) where it came so");
   app.add_option("--petsc", arguments.petsc, "Options of PETSc's, for example \"-ksp_view\"");
   app.add_option("--checkpoint", arguments.options.checkpoint,
@@ -89,26 +90,37 @@ void check_files(const Arguments& arguments) {
                 {arguments.scene, arguments.body}, arguments.force);
 }
 
-std::string failed_name(const std::string& output) {
+std::string failed_name(const std::string& output, const char* end = ".failed.vtu") {
   const std::string ending = extension(output);
   const bool known = ending == "vtu" || ending == "pvtu";
-  return (known ? output.substr(0, output.size() - 1 - ending.size()) : output) + ".failed.vtu";
+  return (known ? output.substr(0, output.size() - 1 - ending.size()) : output) + end;
+}
+
+void add_pieces(const PieceFiles& pieces, const std::string& list, std::vector<std::string>& names) {
+  names.push_back(shared_surface_path(list));
+  for (std::uint32_t p = 0; p < pieces.files.size(); ++p) names.push_back(piece_path(list, p));
 }
 
 // What is written before the first of it appears.
 std::vector<std::string> names_of_results(const Arguments& arguments,
                                           const std::optional<PieceFiles>& pieces) {
   std::vector<std::string> names = {arguments.output, arguments.summary};
-  if (!pieces) return names;
-  names.push_back(shared_surface_path(arguments.output));
-  for (std::uint32_t p = 0; p < pieces->files.size(); ++p) names.push_back(piece_path(arguments.output, p));
+  if (pieces) add_pieces(*pieces, arguments.output, names);
   return names;
+}
+
+// Of a run of which no rank has the whole body.
+std::string failed_list(const Arguments& arguments) {
+  return failed_name(arguments.output, ".failed.pvtu");
 }
 
 // Pieces may go by another name than their list.
 void check_pieces(const Arguments& arguments, const PieceFiles& pieces) {
   std::vector<OutputName> outputs = {{arguments.options.checkpoint}, {arguments.options.failed_output}};
-  for (const std::string& name : names_of_results(arguments, pieces)) outputs.push_back({name});
+  std::vector<std::string> names = names_of_results(arguments, pieces);
+  names.push_back(failed_list(arguments));
+  add_pieces(pieces, names.back(), names);
+  for (const std::string& name : names) outputs.push_back({name});
   check_outputs(outputs, files_of(pieces), arguments.force);
 }
 
@@ -134,6 +146,60 @@ void explain_ranks(const distributed::Leader& leader, Progress& progress) {
                              human_bytes(uses[r].memory)));
 }
 
+// What is said of a result.
+struct Told {
+  std::string summary;  // empty: nobody asked
+  std::vector<std::string> answer;
+};
+
+Told told_of(const Arguments& arguments, const SimulateResult& result, const Body& body,
+             const std::vector<Material>& materials, const KeptWarnings& warnings, Progress& progress) {
+  if (const std::string unused = distributed::Session::unused_options(); !unused.empty())
+    progress.warn(fmt::format("--petsc: nothing asked for {}", unused));
+  if (arguments.verbose || arguments.options.explain)
+    for (const std::string& line : summary_lines(result)) progress.say(line);
+  Told told{"", answer_lines(result, body, materials)};
+  if (!arguments.summary.empty() || arguments.json)
+    told.summary = summary_json(result, body, materials, warnings.lines());
+  return told;
+}
+
+void end_with(const Told& told, const Arguments& arguments, Progress& progress) {
+  progress.finish();
+  for (const std::string& line : told.answer) progress.say(line);
+  if (arguments.json) write_text(told.summary, "-");
+}
+
+// Whether each rank may have its own pieces and none the whole (docs/guide/mpi.md).
+bool may_share(const Arguments& arguments, const std::optional<PieceFiles>& pieces) {
+  const SimulateOptions& options = arguments.options;
+  const auto ranks = static_cast<std::size_t>(distributed::ranks());
+  return pieces && ranks > 1 && pieces->files.size() % ranks == 0 && !options.estimate &&
+         options.checkpoint.empty() && arguments.resume.empty();
+}
+
+// Where no rank has the whole body; false: one has to.
+bool lead_shared(const Arguments& arguments, const PieceFiles& pieces, const Scene& scene,
+                 const distributed::Leader& leader, const KeptWarnings& warnings, Progress& progress) {
+  distributed::SharedRequest request{pieces, arguments.output, failed_list(arguments), arguments.summary};
+  request.stress = arguments.options.stress;
+  request.compress = arguments.compress;
+  request.threads = arguments.options.threads;
+  Told told;
+  const std::string why =
+      leader.run(request, arguments.options, progress, [&](const SimulateResult& result, const Body& body) {
+        told = told_of(arguments, result, body, known_materials(scene, body), warnings, progress);
+        if (!arguments.summary.empty()) write_text(told.summary, arguments.summary);
+      });
+  if (!why.empty()) {
+    if (arguments.verbose || arguments.options.explain) progress.say("rank 0 puts the body together: " + why);
+    return false;
+  }
+  if (arguments.options.explain) explain_ranks(leader, progress);
+  end_with(told, arguments, progress);
+  return true;
+}
+
 // What rank 0 does.
 void lead(Arguments& arguments, distributed::Leader& leader) {
   SimulateOptions& options = arguments.options;
@@ -147,21 +213,19 @@ void lead(Arguments& arguments, distributed::Leader& leader) {
   std::optional<PieceFiles> pieces;
   if (distributed::is_piece_list(arguments.body)) pieces = read_piece_list(arguments.body);
   if (pieces) check_pieces(arguments, *pieces);
+  leader.give(scene);
+  if (may_share(arguments, pieces) && lead_shared(arguments, *pieces, scene, leader, warnings, progress))
+    return;
   Body body = pieces ? join_pieces(*pieces) : read_body(arguments.body);
   erase_stress_columns(body);
   distributed::refuse_unsupported(scene, body);
   OutputsTogether outputs(names_of_results(arguments, pieces));
-  leader.give(scene);
   options.hooks = std::make_shared<const LoadStepHooks>(hooks_of(arguments, scene, body, leader));
   options.checkpoint.clear();  // that of timed runs
   const SimulateResult result = simulate::simulate(body, scene, options, progress);
   options.hooks.reset();
   const std::vector<Material> materials = known_materials(scene, body);
-  const auto summary = [&] { return summary_json(result, body, materials, warnings.lines()); };
-  if (const std::string unused = distributed::Session::unused_options(); !unused.empty())
-    progress.warn(fmt::format("--petsc: nothing asked for {}", unused));
-  if (arguments.verbose || options.explain)
-    for (const std::string& line : summary_lines(result)) progress.say(line);
+  const Told told = told_of(arguments, result, body, materials, warnings, progress);
   if (options.explain) explain_ranks(leader, progress);
   progress.stage("write");
   BodyFileOptions file_options;
@@ -170,11 +234,9 @@ void lead(Arguments& arguments, distributed::Leader& leader) {
     distributed::write_in_pieces(body, *pieces, arguments.output, arguments.compress);
   else
     write_body(body, arguments.output, file_options);
-  if (!arguments.summary.empty()) write_text(summary(), arguments.summary);
+  if (!arguments.summary.empty()) write_text(told.summary, arguments.summary);
   outputs.appear();
-  progress.finish();
-  for (const std::string& line : answer_lines(result, body, materials)) progress.say(line);
-  if (arguments.json) write_text(summary(), "-");
+  end_with(told, arguments, progress);
 }
 
 // The others say nothing.

@@ -63,7 +63,8 @@ Columns taken(const Columns& whole, const Places& places) {
   return result;
 }
 
-// Of all that the pieces of two results may differ in: one may move like another and bear other stresses.
+}  // namespace
+
 std::uint64_t hash_of(const Body& result) {
   const std::span<const Vec3> positions = result.position;
   std::vector<std::uint64_t> made_from = {content_hash(std::as_bytes(positions))};
@@ -77,19 +78,17 @@ std::uint64_t hash_of(const Body& result) {
   return run_number(made_from);
 }
 
-}  // namespace
-
 bool is_piece_list(const std::string& path) {
   return extension(path) == "pvtu";
 }
 
-void write_in_pieces(Body& result, const PieceFiles& files, const std::string& list, bool compress) {
-  const std::array<std::uint64_t, 2> made_from = {files.run, hash_of(result)};
-  const std::uint64_t run = run_number(made_from);
-  const SurfaceBeside surface = write_shared_surface(result, list, compress);
+void write_pieces(Body& result, const PieceFiles& files, const PieceRange& range, const std::string& list,
+                  bool compress) {
+  const bool first = range.begin == 0;
+  const SurfaceBeside surface =
+      first ? write_shared_surface(result, list, compress) : shared_surface(result, list);
   std::vector<vtu::HeadArray> arrays;
-  const auto count = static_cast<std::uint32_t>(files.files.size());
-  for (std::uint32_t p = 0; p < count; ++p) {
+  for (std::uint32_t p = range.begin; p < range.end; ++p) {
     PieceBody piece = read_piece(files, p);
     const Places elements = places_of_elements(piece.body, result);
     const Places cells = places_of_cells(piece.body, result, elements);
@@ -101,10 +100,16 @@ void write_in_pieces(Body& result, const PieceFiles& files, const std::string& l
     const std::string which = piece.body.notes["piece"];
     piece.body.notes = result.notes;
     piece.body.notes["piece"] = which;
-    piece.numbers.run = run;
+    piece.numbers.run = range.run;
     arrays = write_piece(piece, list, surface, compress);
   }
-  write_piece_list(list, run, count, arrays);
+  if (first) write_piece_list(list, range.run, static_cast<std::uint32_t>(files.files.size()), arrays);
+}
+
+void write_in_pieces(Body& result, const PieceFiles& files, const std::string& list, bool compress) {
+  const std::array<std::uint64_t, 2> made_from = {files.run, hash_of(result)};
+  write_pieces(result, files, {0, static_cast<std::uint32_t>(files.files.size()), run_number(made_from)},
+               list, compress);
 }
 
 }  // namespace flexel::distributed

@@ -30,7 +30,7 @@ using simulate::NewtonProgress;
 using simulate::Scene;
 using simulate::State;
 
-enum class Order : std::uint8_t { threads, scene, begin, solve, of_state, multiply, drop, uses, end };
+enum class Order : std::uint8_t { threads, scene, share, begin, solve, of_state, multiply, drop, uses, end };
 // Of a state, or of the tangent.
 enum class Question : std::uint8_t { figures, forces, stable, diagonal };
 
@@ -65,6 +65,12 @@ void order(Order what, const Bytes& more = {}) {
   Bytes bytes{static_cast<std::byte>(what)};
   bytes.insert(bytes.end(), more.begin(), more.end());
   broadcast(bytes);
+}
+
+template <class Archive>
+void visit_request(Archive& archive, SharedRequest& request) {
+  visit_all(archive, request.files.list, request.files.run, request.files.files, request.output,
+            request.failed, request.stress, request.compress, request.threads);
 }
 
 Bytes bytes_of(NewtonOptions& options) {
@@ -297,6 +303,8 @@ class Follower {
         return;
       case Order::scene:
         return take_scene(more);
+      case Order::share:
+        return share(more);
       case Order::begin:
         members_.push_back(
             std::make_unique<Member>(unpack_piece(receive(0)), scene_, std::vector<PetscInt>()));
@@ -332,6 +340,17 @@ class Follower {
     (void)member.solve(options, nullptr);
     (void)member.displacement();
   }
+  // All know where it takes the whole body: the leader goes on with that.
+  void share(std::span<const std::byte> more) {
+    Unpacker unpacker(more, "the message of a run", "is damaged");
+    SharedRequest request;
+    visit_request(unpacker, request);
+    Progress silent("", Progress::Mode::silent);
+    try {
+      most_cells = static_cast<double>(run_on_pieces(request, scene_, {}, silent, {}));
+    } catch (const WholeBodyNeeded&) {
+    }
+  }
   void take_scene(std::span<const std::byte> more) {
     std::string text, name;
     Unpacker unpacker(more, "the message of a scene", "is damaged");
@@ -353,6 +372,21 @@ void Leader::give_threads(int threads) {
 void Leader::give(const Scene& scene) {
   scene_ = &scene;
   order(Order::scene, message(scene.text, scene.name));
+}
+
+std::string Leader::run(const SharedRequest& request, const simulate::SimulateOptions& options,
+                        Progress& progress, const TellResult& tell) const {
+  const AtWork together;
+  Packer packer;
+  SharedRequest said = request;
+  visit_request(packer, said);
+  order(Order::share, packer.bytes);
+  try {
+    most_cells = static_cast<double>(run_on_pieces(request, *scene_, options, progress, tell));
+  } catch (const WholeBodyNeeded& needed) {
+    return needed.what();
+  }
+  return "";
 }
 
 std::vector<RankUse> Leader::uses() const {

@@ -3,6 +3,7 @@
 #pragma once
 #include <memory>
 
+#include "distributed/shared_run.h"
 #include "simulate/equilibrium/equilibrium.h"
 #include "simulate/scene/scene.h"
 
@@ -28,6 +29,9 @@ class Leader {
   // To all: how many threads each uses; the scene, which is kept a reference to. Before make_solver().
   void give_threads(int threads);
   void give(const simulate::Scene& scene);
+  // run_on_pieces() on all ranks. Returned is why it takes the whole body, "" where it was done without.
+  [[nodiscard]] std::string run(const SharedRequest& request, const simulate::SimulateOptions& options,
+                                Progress& progress, const TellResult& tell) const;
   // What each rank has taken so far.
   [[nodiscard]] std::vector<RankUse> uses() const;
   // The others end with this exit code, unless they are at work: then Session::abort() is left.

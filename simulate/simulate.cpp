@@ -1,5 +1,6 @@
 // The run: materials, loose crumbs, effects, the check for free motions, equilibrium, what is reported.
 #include "simulate/simulate.h"
+#include "formats/pieces/other_pieces.h"
 #include "simulate/result/options.h"
 #include "simulate/result/overload.h"
 #include "simulate/result/result.h"
@@ -126,6 +127,25 @@ void refuse_kernel(const SimulateOptions& options, const std::string& scene) {
     throw InputError(scene, "--isa is for timed runs: give [run] time = \"1 s\", or leave it out");
 }
 
+// refuse_loose_fragments() of a body in pieces, which is one piece of matter.
+void refuse_loose_piece(const std::vector<std::uint8_t>& tied, const Body& body, const std::string& scene) {
+  double held = 0;  // ghosts far from own cells are held so that nothing is asked of them
+  for (std::uint32_t e = 0; e < tied.size(); ++e) held += counts_element(e) && tied[e];
+  if (over_pieces(held) > 0) return;
+  Fragments one;
+  one.list.resize(1);
+  one.of_cell.assign(body.cell_count(), 0);
+  one.of_element.assign(body.element_count(), 0);
+  refuse_loose_fragments(one, body, std::vector<std::uint8_t>(tied.size(), 0), {}, scene);
+}
+
+// Cells of other processes bear stresses too.
+Problem with_ghosts(const Problem& problem) {
+  Problem whole = problem;
+  whole.stray_cell.clear();
+  return whole;
+}
+
 class Run {
  public:
   // `judged`: asks whether the equilibrium is stable, which takes a linear solution.
@@ -135,7 +155,7 @@ class Run {
         options_(options),
         progress_(progress),
         judged_(judged),
-        fragments_(find_fragments(body)),
+        fragments_(other_pieces() ? Fragments() : find_fragments(body)),  // a body in pieces is one
         problem_(equilibrium_problem(body_, scene, fragments_, unsupported_)) {
     constexpr double kPosed = 0.2;
     prepared(kPosed);
@@ -175,12 +195,15 @@ EquilibriumResult Run::solve(Mechanics& mechanics) {
   const LoadStepSolver solver =
       hooks && hooks->make_solver ? hooks->make_solver(mechanics) : LoadStepSolver();
   tied_ = mechanics.tied_elements();
-  refuse_loose_fragments(fragments_, body_, tied_, mechanics.coupled_elements(), scene_.name);
+  if (other_pieces())
+    refuse_loose_piece(tied_, body_, scene_.name);
+  else
+    refuse_loose_fragments(fragments_, body_, tied_, mechanics.coupled_elements(), scene_.name);
   refuse_unsupported_elements(mechanics, state_, scene_.name);
   refuse_free_motions(mechanics, state_, scene_.name);
   try {
     CoarseStart start;
-    if (body_.cell_count() >= kLeastCellsToCoarsen)
+    if (body_.cell_count() >= kLeastCellsToCoarsen && !other_pieces())
       start = [&](Progress& stretch) { return coarse_equilibrium(stretch); };
     return find_equilibrium(mechanics, state_, scene_.run, progress_, start, hooks, solver);
   } catch (const OverloadError& error) {
@@ -225,6 +248,11 @@ std::optional<NearStart> Run::coarse_equilibrium(Progress& stretch) {
 std::string Run::save_failed() {
   const StopWaits saving;
   if (options_.failed_output.empty()) return "";
+  if (other_pieces()) {
+    move_body(body_, state_);
+    options_.hooks->save(body_, options_.failed_output);
+    return "; the last state in equilibrium is in " + options_.failed_output;
+  }
   carry_strays(fragments_, problem_, lone_elements(problem_), state_);
   move_body(body_, state_);
   body_.cell_columns.erase(kFreeStrainColumn);  // of this run only
@@ -263,6 +291,15 @@ void Run::warn_of_buckling(Mechanics& mechanics, const EquilibriumResult& solved
                                   : "[run] buckling = 1 with model \"quadratic\" tells from which "
                                     "load on")
            : "whether this equilibrium is stable was not found out: the part may buckle"));
+}
+
+// Of the whole body.
+std::size_t all_unknowns(const Constraints& constraints, std::size_t elements) {
+  if (!other_pieces()) return count_unknowns(constraints, elements);
+  Constraints own;
+  for (std::uint32_t e = 0; e < elements; ++e)
+    if (counts_element(e)) own.mask.push_back(constraints.mask[e]);
+  return static_cast<std::size_t>(over_pieces(static_cast<double>(count_unknowns(own, own.mask.size()))));
 }
 
 void count_work(const EquilibriumResult& solved, SimulateResult& result) {
@@ -308,9 +345,10 @@ SimulateResult Run::operator()() {
   result.smallest_jacobian = mechanics.most_compressed(state_).value;
   measure_corners(mechanics.smallest_corner_jacobian(state_), body_, result, progress_);
   mechanics.move_cells(nullptr);
-  if (options_.stress) measure_stress(problem_, state_, body_, result);
+  if (options_.stress)
+    measure_stress(other_pieces() ? with_ghosts(problem_) : problem_, state_, body_, result);
   if (options_.estimate) mark_singular(body_, tied_, result);
-  carry_strays(fragments_, problem_, lone_elements(problem_), state_);
+  if (!other_pieces()) carry_strays(fragments_, problem_, lone_elements(problem_), state_);
   move_body(body_, state_);
   if (scene_.run.renormalise) renormalise_all(body_, problem_, state_.displacement);
   for (const ProbePoints& probe : probes) result.probes.push_back(measure(probe, state_));
@@ -319,7 +357,7 @@ SimulateResult Run::operator()() {
   result.mass = mass_of(problem_);
   refuse_not_finite(result, scene_.name);
   count_work(solved, result);
-  result.unknowns = count_unknowns(mechanics.constraints(), body_.element_count());
+  result.unknowns = all_unknowns(mechanics.constraints(), body_.element_count());
   result.start_newton_iterations = start_newton_iterations_;
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
   if (options_.explain) {

@@ -9,6 +9,7 @@
 #include "base/human.h"
 #include "base/units.h"
 #include "base/version.h"
+#include "formats/pieces/other_pieces.h"
 #include "simulate/probes/report.h"
 #include "simulate/quadratic/local_stress.h"
 #include "simulate/result/result.h"
@@ -350,8 +351,8 @@ std::string summary_json(const SimulateResult& result, const Body& body,
   Json json;
   json["program"] = "flexel-simulate";
   json["version"] = version();
-  json["elements"] = body.element_count();
-  json["cells"] = body.cell_count();
+  json["elements"] = whole_element_count(body);
+  json["cells"] = whole_cell_count(body);
   json["stray_cells"] = result.stray_cells;
   json["parts"] = Json::array();
   for (const Part& part : body.parts)

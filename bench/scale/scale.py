@@ -33,12 +33,13 @@ def box(path, sides):
     path.write_text("".join(f"v {a} {b} {c}\n" for a, b, c in corners) + "".join("f " + " ".join(str(i + 1) for i in quad) + "\n" for quad in quads))
 
 
-def bar(folder, sides):
-    """A bar of so many cells along x, y and z."""
-    body = folder / f"bar-{sides[0]}-{sides[1]}.vtu"
+def bar(folder, sides, pieces=0):
+    """A bar of so many cells along x, y and z; in pieces, a list of them."""
+    body = folder / (f"bar-{sides[0]}-{sides[1]}-{pieces}.pvtu" if pieces else f"bar-{sides[0]}-{sides[1]}.vtu")
     if not body.exists():
         box(folder / "bar.obj", sides)
-        subprocess.run(["flexel-voxelize", folder / "bar.obj", "--size", "1 mm", "--quiet", "-o", body], check=True, stderr=subprocess.DEVNULL)
+        subprocess.run(["flexel-voxelize", folder / "bar.obj", "--size", "1 mm", "--quiet", "-o", body, *(["--pieces", str(pieces)] if pieces else [])], check=True,
+                       stderr=subprocess.DEVNULL)
     (folder / "scene.toml").write_text(SCENE)
     return body
 
@@ -58,12 +59,14 @@ def bytes_of(text):
     return float(number.replace(",", "")) * {"B": 1, "kB": 1e3, "KB": 1e3, "MB": 1e6, "GB": 1e9}[unit]
 
 
-def solve(folder, body, ranks):
+def solve(folder, body, ranks, stress=False):
     """One run of flexel-simulate-mpi (ranks 0: of flexel-simulate): its summary and figures."""
     out, log = folder / "out.vtu", folder / "log.txt"
     program = ["mpirun", "-n", ranks, "flexel-simulate-mpi", "--petsc", f"-log_view :{log}"] if ranks else ["flexel-simulate", "--threads", 1]
-    wall, processor, said = run([*program, folder / "scene.toml", body, "--no-estimate", "--no-stress", "--explain", "--summary", folder / "s.json",
-                                 "-o", out])
+    wall, processor, said = run([*program, folder / "scene.toml", body, "--no-estimate", *([] if stress else ["--no-stress"]), "--explain", "--summary", folder / "s.json",
+                                 "-o", out.with_suffix(body.suffix), "--force"])
+    if "puts the body together" in said:
+        sys.exit(f"scale.py: rank 0 has the whole of {body}:\n{said}")
     found = json.loads((folder / "s.json").read_text())
     linear = re.search(r"linear solver\D*([\d.]+) s", said)
     found.update(wall=wall, processor=processor, linear=float(linear[1]) if linear else float("nan"), ranks=ranks,
@@ -122,20 +125,20 @@ def memory_words(found):
 
 def memory_table(folder, cases):
     print("\n## Memory\n\nPeak of each process (the kernel's ru_maxrss). Base: what a rank takes for a bar of 16 cells, which is PETSc, MPI and the program. Share: the largest "
-          "rank's peak times the ranks over the peak of one rank alone, both less their base: 1 is what cutting can give at best, 1.3 is asked. A body in pieces (`.pvtu`, as many "
-          "as ranks) takes the same, but for what rank 0 joins them with before the run.\n")
+          "rank's peak times the ranks over the peak of one rank alone, both less their base: 1 is what cutting can give at best, 1.3 is asked. Of one file (`.vtu`) rank 0 has the "
+          "whole body besides its cells; of as many pieces as ranks (`.pvtu`) no rank has.\n")
     base = {ranks: max(solve(folder, bar(folder, (16, 1, 1)), ranks)["memory"]) for ranks in RANKS}
-    head("cells", "ranks", "base MB", "MB of rank 0", "MB of the largest other", "share")
-    results = []
+    head("cells", "body", "ranks", "base MB", "MB of rank 0", "MB of the largest other", "share")
+    results, in_pieces = [], []
     for sides in cases:
         one = None
-        for ranks in RANKS:
-            found = solve(folder, bar(folder, sides), ranks)
-            results.append((sides, found))
+        for ranks, pieces in ((1, 0), (2, 0), (4, 0), (2, 2), (4, 4)):
+            found = solve(folder, bar(folder, sides, pieces), ranks)
+            (in_pieces if pieces else results).append((sides, found))
             own = max(found["memory"]) - base[ranks]
             one = one or own
-            row(f"{found['cells']:,}", ranks, f"{base[ranks] / 1e6:,.0f}", *memory_words(found), f"{own * ranks / one:.2f}")
-    return results
+            row(f"{found['cells']:,}", f"{pieces} pieces" if pieces else "one file", ranks, f"{base[ranks] / 1e6:,.0f}", *memory_words(found), f"{own * ranks / one:.2f}")
+    return results, in_pieces
 
 
 def scaling_table(folder, title, words, cases):
@@ -163,7 +166,8 @@ def message_table(results):
         row(f"{found['cells']:,}", ranks, f"{found['cells'] // ranks:,}", f"{calls:,}", f"{messages * length / calls:,.0f}",
             f"{24 * (sides[1] + 1) * (sides[2] + 1) * faces:,}", f"{messages / calls:.1f}", f"{reductions / max(1, found['cg_iterations']):.1f}")
     print("\nA new tangent sends the diagonal blocks of those faces' elements, 72 bytes each, and what a rank's cells make of the groups of others there; a residual forces, "
-          "24 bytes an element. Rank 0 hands out and takes back all displacements once a load step, 24 bytes an element, and sends each rank its piece once a run.")
+          "24 bytes an element. Of a body in one file rank 0 hands out and takes back all displacements once a load step, 24 bytes an element, and sends each rank its piece once a run; of one in "
+          "pieces, ranks tell each other those of two layers of cells beside their own.")
 
 
 def memory_fit(results):
@@ -176,8 +180,10 @@ def memory_fit(results):
     return piece, whole, base
 
 
-def billion(results):
-    piece, whole, base = memory_fit(results)
+def billion(results, in_pieces):
+    """`in_pieces`: of runs in which no rank had the whole; none: their figures are left out."""
+    _, whole, _ = memory_fit(results)
+    piece, beside, base = memory_fit(in_pieces or results)
     cells, ranks = 1e9, 1000
     each = cells / ranks
     side = (cells / 4) ** (1 / 3)
@@ -191,12 +197,14 @@ def billion(results):
 |---|---|---|
 | cells a rank | {each:,.0f} | 1e9 / 1,000 |
 | memory a rank, its piece | {(base + piece * each) / 1e9:.1f} GB | {base / 1e6:,.0f} MB and {piece:,.0f} bytes a cell: the difference of the largest and the smallest rank above |
-| memory of rank 0 besides | {whole * cells / 1e9:,.0f} GB | {whole:,.0f} bytes a cell of the whole body, rank 0 above less its piece |
+| memory of rank 0 besides, body in pieces | {f'{beside * cells / 1e9:,.0f} GB | {beside:,.0f} bytes a cell of the whole body, likewise' if in_pieces else '- | not measured'} |
+| memory of rank 0 besides, body in one file | {whole * cells / 1e9:,.0f} GB | {whole:,.0f} bytes a cell of the whole body, rank 0 above less its piece |
 | bytes a product and rank, finest level | {2 * face / 1e6:.1f} MB | two faces of {side:,.0f} x {side:,.0f} elements, 24 bytes each |
 | bytes a tangent and rank | {2 * 72 * side * side / 1e6:.1f} MB | a block of 72 bytes an element of those faces |
 | processor seconds a rank | {least * each * iterations:,.0f} s | {least * 1e6:.1f} us a cell and CG iteration, all of the run on one rank above, and {iterations} iterations, the most above |
 
-So rank 0 is what stops it: it holds the whole body, and a machine of 1 TB ends near {1e12 / max(whole, 1) / 1e9:.1f} billion cells. Slabs of a bar 4:1:1 cut in 1,000 are {4 * side / 1000:.1f} cells
+So the body has to come in pieces: where rank 0 holds the whole, a machine of 1 TB ends near {1e12 / max(whole, 1) / 1e9:.1f} billion cells. What error bars need of coarser lattices is not
+in this: with them rank 0 holds the whole. Each rank has the whole surface, of which the bar has 12 triangles. Slabs of a bar 4:1:1 cut in 1,000 are {4 * side / 1000:.1f} cells
 thick, with as many elements on their faces as within: so many ranks want another cut. And PETSc as Debian builds it counts unknowns in 32 bits, which end at 2.1e9 (3e9 are needed):
 `libpetsc64-real-dev` has 64.""")
 
@@ -243,15 +251,15 @@ def main():
 Printed by `bench/scale/scale.py{' --large' if options.large else ''}` on {os.cpu_count()} cores ({processor_name()}), load average {os.getloadavg()[0]:.1f} when it began. A bar of steel, 4:1:1, held at one end, with a small
 load across the other; `flexel-simulate-mpi` without error bars and stresses. Wall and linear seconds are those of a machine with that load; more ranks than cores
 share them.""")
-        large = []
+        large, in_pieces = [], []
         if not options.last:
             hierarchy_table(folder, [(56, 14, 14), (116, 29, 29)] + ([(252, 63, 63)] if options.large else []))
-            large = memory_table(folder, [(56, 14, 14), (116, 29, 29), (168, 42, 42)])
+            large, in_pieces = memory_table(folder, [(56, 14, 14), (116, 29, 29), (168, 42, 42)])
         results = scaling_table(folder, "Strong scaling", "The same body on more ranks.", [((88, 22, 22), ranks) for ranks in (1, 2, 4)])
         results += scaling_table(folder, "Weak scaling", "As many cells for each rank: the bar grows along its length.",
                                  [((40 * ranks, 16, 16), ranks) for ranks in (1, 2, 4)])
         message_table(results)
-        billion(results + large)
+        billion(results + large, in_pieces)
         yardstick(folder, options.ex56, results)
 
 

@@ -159,13 +159,15 @@ bool is_left(const Body& body, const CarvedVoxels& carved, std::uint32_t polygon
   return true;
 }
 
-FirstLargest largest_of_surface(const Body& body, const std::vector<Vec3>& displacement) {
+FirstLargest largest_of_surface(const Body& body, const std::vector<Vec3>& displacement,
+                                const SurfacePiece* piece) {
   constexpr double kMore = 1e-9;  // than rounding
   const SurfaceMotion motion(body, displacement);
-  const std::vector<std::uint32_t> around = polygons_around_vertices(body);
+  const std::vector<std::uint32_t> around =
+      piece ? polygons_around_vertices(body.surface, piece->with_cells) : polygons_around_vertices(body);
   const CarvedVoxels carved = carved_voxels(body);
   FirstLargest largest = parallel_sum<FirstLargest>(around.size(), [&](std::size_t v) {
-    if (around[v] == kNoPolygonAround) return FirstLargest{};
+    if (around[v] == kNoPolygonAround || (piece && !piece->vertices[v])) return FirstLargest{};
     const Vec3& vertex = body.surface.vertices[v];
     const std::optional<CellPoint> cell = locate_on_surface(body, around[v], vertex);
     if (!cell || !is_left(body, carved, around[v], cell->cell, vertex)) return FirstLargest{};
@@ -219,20 +221,28 @@ std::vector<std::uint8_t> elements_in_matter(const Body& body) {
 }
 
 std::vector<std::uint32_t> polygons_around_vertices(const Body& body) {
-  const Surface& surface = body.surface;
+  std::vector<std::uint8_t> with_cells(body.surface.polygon_count(), 0);
+  if (body.surface_cell_offsets.size() == with_cells.size() + 1)
+    for (std::size_t p = 0; p < with_cells.size(); ++p)
+      with_cells[p] = body.surface_cell_offsets[p + 1] > body.surface_cell_offsets[p];
+  return polygons_around_vertices(body.surface, with_cells);
+}
+
+std::vector<std::uint32_t> polygons_around_vertices(const Surface& surface,
+                                                    const std::vector<std::uint8_t>& with_cells) {
   std::vector<std::uint32_t> polygon(surface.vertices.size(), kNoPolygonAround);
-  if (body.surface_cell_offsets.size() != surface.polygon_count() + 1) return polygon;
   for (std::uint32_t p = 0; p < surface.polygon_count(); ++p)
-    if (body.surface_cell_offsets[p + 1] > body.surface_cell_offsets[p])
+    if (with_cells[p])
       for (const std::uint32_t v : surface.polygon(p))
         if (polygon[v] == kNoPolygonAround) polygon[v] = p;
   return polygon;
 }
 
-LargestDisplacement largest_displacement(const Body& body, const std::vector<Vec3>& displacement) {
+LargestDisplacement largest_displacement(const Body& body, const std::vector<Vec3>& displacement,
+                                         const SurfacePiece* piece) {
   std::vector<std::uint8_t> inside = elements_in_matter(body);
-  FirstLargest largest = largest_of_surface(body, displacement);
-  if (largest.squared < 0 && std::find(inside.begin(), inside.end(), 1) == inside.end())
+  FirstLargest largest = largest_of_surface(body, displacement, piece);
+  if (!piece && largest.squared < 0 && std::find(inside.begin(), inside.end(), 1) == inside.end())
     std::fill(inside.begin(), inside.end(), std::uint8_t{1});
   largest += parallel_sum<FirstLargest>(inside.size(), [&](std::size_t e) {
     return inside[e] != 0 ? moved(displacement[e], body.rest[e]) : FirstLargest{};
@@ -245,7 +255,7 @@ LargestDisplacement largest_displacement(const Body& body) {
 }
 
 LargestDisplacement largest_displacement_of_surface(const Body& body) {
-  return largest_of_surface(body, own_displacement(body)).found;
+  return largest_of_surface(body, own_displacement(body), nullptr).found;
 }
 
 std::optional<Vec3> displacement_on_surface(const Body& body, std::uint32_t polygon, const Vec3& at) {

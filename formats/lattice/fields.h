@@ -16,6 +16,9 @@ namespace flexel {
 // where there is none.
 constexpr std::uint32_t kNoPolygonAround = 0xffffffffu;
 [[nodiscard]] std::vector<std::uint32_t> polygons_around_vertices(const Body& body);
+// Likewise; (polygons) 1: a cell lies under it.
+[[nodiscard]] std::vector<std::uint32_t> polygons_around_vertices(
+    const Surface& surface, const std::vector<std::uint8_t>& with_cells);
 
 struct LargestDisplacement {
   Vec3 displacement = Vec3::Zero();  // m
@@ -30,8 +33,15 @@ struct LargestDisplacement {
 // polygon may move most where it has no vertex. Each is moved by the cell that carries it (trilinear
 // weights, or the field of model `quadratic`). `displacement`: (elements x 3) m. Of equal ones the first,
 // vertices before others. A body without a surface and without a whole cell: of all elements.
+//
+// Of a piece of a body (formats/pieces/other_pieces.h) that of its own matter, where `piece` is given.
+struct SurfacePiece {
+  const std::vector<std::uint8_t>& with_cells;  // (polygons) 1: cells of any piece lie under it
+  const std::vector<std::uint8_t>& vertices;    // 1: one of this piece carries it
+};
 [[nodiscard]] LargestDisplacement largest_displacement(const Body& body,
-                                                       const std::vector<Vec3>& displacement);
+                                                       const std::vector<Vec3>& displacement,
+                                                       const SurfacePiece* piece = nullptr);
 // Of the body's own positions.
 [[nodiscard]] LargestDisplacement largest_displacement(const Body& body);
 // Of the surface alone, by the body's own positions. Zero where no cell lies under it.

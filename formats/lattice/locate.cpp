@@ -94,6 +94,16 @@ CellPoint cell_point(const Body& body, std::uint32_t cell, const Vec3& point) {
   return weights_in(body, cell, part_of_cell(body, cell).lattice.to_lattice(point));
 }
 
+bool is_near(const Body& body, const CellPoint& at) {
+  Vec3 inside = Vec3::Zero();  // coordinates in the cell
+  for (std::size_t a = 0; a < 8; ++a)
+    for (int axis = 0; axis < 3; ++axis)
+      if (a >> axis & 1u) inside[axis] += at.weights[a];
+  const Vec3& spacing = part_of_cell(body, at.cell).lattice.spacing;
+  const Vec3 outside = (inside - Vec3::Ones()).cwiseMax(-inside).cwiseMax(0.0);
+  return outside.cwiseProduct(spacing).norm() <= spacing.minCoeff();
+}
+
 SurfaceLocator::SurfaceLocator(const Body& body, std::size_t polygon) : body_(body) {
   if (polygon + 1 >= body.surface_cell_offsets.size()) return;
   const std::uint32_t begin = body.surface_cell_offsets[polygon],

@@ -18,6 +18,9 @@ struct CellPoint {
   std::array<double, 8> weights{};  // by corner a = i + 2 j + 4 k
 };
 
+// Whether the point lies within a spacing, the least of its part's, of its cell.
+[[nodiscard]] bool is_near(const Body& body, const CellPoint& at);
+
 // Trilinear weights of the rest point `point` (m, world frame) in `cell`.
 [[nodiscard]] CellPoint cell_point(const Body& body, std::uint32_t cell, const Vec3& point);
 

@@ -1,5 +1,5 @@
 // Elements come from the piece that owns them, cells from that whose own they are; both are sorted at the end into the
-// order of every body.
+// order of every body. Of some pieces and what is around, elements come from whichever piece is read first: all have the same.
 #include "formats/pieces/join.h"
 
 #include <fmt/format.h>
@@ -103,12 +103,81 @@ void permute(const std::vector<std::uint32_t>& from, std::vector<Value>& values,
   values = std::move(ordered);
 }
 
+// Whose own a cell is: a piece owns the points of the planes above its layers.
+std::uint32_t piece_of_cell(const PieceBody& piece, std::size_t cell) {
+  std::uint32_t found = 0;
+  for (const std::uint32_t e : piece.body.cell_elements[cell])
+    found = std::max(found, piece.numbers.owner(piece.global_point[e]));
+  return found;
+}
+
+// Numbers of points, ascending.
+using Points = std::vector<std::int64_t>;
+
+bool has_one_of(const PieceBody& piece, std::size_t cell, const Points& points) {
+  const auto& elements = piece.body.cell_elements[cell];
+  return std::any_of(elements.begin(), elements.end(), [&](std::uint32_t e) {
+    return std::binary_search(points.begin(), points.end(), piece.global_point[e]);
+  });
+}
+
+// Adds those of the cells with ring[cell] == `of`.
+void add_points(const PieceBody& piece, const std::vector<std::uint8_t>& ring, std::uint8_t of, Points& to) {
+  for (std::size_t c = 0; c < ring.size(); ++c)
+    if (ring[c] == of)
+      for (const std::uint32_t e : piece.body.cell_elements[c]) to.push_back(piece.global_point[e]);
+  std::sort(to.begin(), to.end());
+  to.erase(std::unique(to.begin(), to.end()), to.end());
+}
+
 class Joiner {
  public:
   Joiner(std::string list, std::optional<std::vector<NearVoxels>> near)
       : list_(std::move(list)), near_(std::move(near)) {}
 
   void add(PieceBody& piece, const std::string& where) {
+    start(piece, where);
+    const Body& from = piece.body;
+    const std::vector<std::uint32_t> part = cell_parts(from);
+    std::vector<bool> kept(from.cell_count());
+    for (std::size_t c = 0; c < kept.size(); ++c)
+      kept[c] = !near_ || (*near_)[part[c]].has(voxel_of(from, c));
+    add_elements(piece, used_by(from, kept), false);  // some of a piece's own are of ghosts alone
+    for (std::size_t c = 0; c < kept.size(); ++c) kept[c] = kept[c] && !piece.ghost_cells[c];
+    add_cells(piece, kept, part);
+  }
+
+  // Of a piece the cells with ring[cell] < 3, ghosts too, and all of their elements.
+  void add_around(PieceBody& piece, const std::string& where, const std::vector<std::uint8_t>& ring) {
+    start(piece, where);
+    const Body& from = piece.body;
+    std::vector<bool> kept(from.cell_count());
+    for (std::size_t c = 0; c < kept.size(); ++c) {
+      kept[c] = ring[c] < 3;
+      if (!kept[c]) continue;
+      ring_.push_back(ring[c]);
+      piece_.push_back(piece_of_cell(piece, c));
+    }
+    add_elements(piece, used_by(from, kept), true);
+    add_cells(piece, kept, cell_parts(from));
+  }
+
+  Body take() {
+    order_elements();
+    order_cells();
+    set_ranges();
+    derive_connections(body_);
+    return std::move(body_);
+  }
+  // After take(), of what add_around() added.
+  void take_rest(PiecesAround& to) {
+    to.point = std::move(point_);
+    to.piece = std::move(piece_);
+    to.ring = std::move(ring_);
+  }
+
+ private:
+  void start(PieceBody& piece, const std::string& where) {
     Body& from = piece.body;
     if (body_.parts.empty()) {
       body_.parts = from.parts;
@@ -119,26 +188,16 @@ class Joiner {
       start_columns(from.cell_columns, body_.cell_columns);
     }
     require_same(from, where);
-    const std::vector<std::uint32_t> part = cell_parts(from);
-    std::vector<bool> kept(from.cell_count()), used(from.element_count(), false);
-    for (std::size_t c = 0; c < kept.size(); ++c) {
-      kept[c] = !near_ || (*near_)[part[c]].has(voxel_of(from, c));
+  }
+
+  static std::vector<bool> used_by(const Body& from, const std::vector<bool>& kept) {
+    std::vector<bool> used(from.element_count(), false);
+    for (std::size_t c = 0; c < kept.size(); ++c)
       if (kept[c])
         for (const std::uint32_t e : from.cell_elements[c]) used[e] = true;
-    }
-    add_elements(piece, used);
-    add_cells(piece, kept, part);
+    return used;
   }
 
-  Body take() {
-    order_elements();
-    order_cells();
-    set_ranges();
-    derive_connections(body_);
-    return std::move(body_);
-  }
-
- private:
   static void start_columns(const Columns& from, Columns& to) {
     for (const auto& [name, column] : from) to[name].components = column.components;
   }
@@ -166,11 +225,12 @@ class Joiner {
                      from.values.begin() + static_cast<std::ptrdiff_t>((i + 1) * n));
   }
 
-  void add_elements(const PieceBody& piece, const std::vector<bool>& used) {
+  // `all`: those that other pieces own too.
+  void add_elements(const PieceBody& piece, const std::vector<bool>& used, bool all) {
     const Body& from = piece.body;
     const std::vector<std::uint32_t> part = element_parts(from);
     for (std::size_t e = 0; e < used.size(); ++e) {
-      if (!used[e] || !piece.numbers.owns(piece.global_point[e])) continue;
+      if (!used[e] || !(all || piece.numbers.owns(piece.global_point[e]))) continue;
       point_.push_back(piece.global_point[e]);
       element_part_.push_back(part[e]);
       body_.lattice_index.push_back(from.lattice_index[e]);
@@ -187,7 +247,7 @@ class Joiner {
     constexpr std::uint32_t kNone = 0xffffffffu;
     std::vector<std::uint32_t> number(from.cell_count(), kNone);
     for (std::size_t c = 0; c < kept.size(); ++c) {
-      if (!kept[c] || piece.ghost_cells[c]) continue;
+      if (!kept[c]) continue;
       number[c] = static_cast<std::uint32_t>(cell_points_.size());
       std::array<std::int64_t, 8> points{};
       for (std::size_t a = 0; a < 8; ++a) points[a] = piece.global_point[from.cell_elements[c][a]];
@@ -218,6 +278,8 @@ class Joiner {
       return std::tuple(element_part_[e], at[2], at[1], at[0], body_.piece[e]);
     };
     std::sort(from.begin(), from.end(), [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
+    const auto same = [&](std::uint32_t a, std::uint32_t b) { return point_[a] == point_[b]; };
+    from.erase(std::unique(from.begin(), from.end(), same), from.end());
     permute(from, point_);
     permute(from, element_part_);
     permute(from, body_.lattice_index);
@@ -242,6 +304,8 @@ class Joiner {
     permute(from, cell_part_);
     permute(from, body_.fill);
     permute(from, body_.broken);
+    if (!ring_.empty()) permute(from, ring_);
+    if (!piece_.empty()) permute(from, piece_);
     for (auto& [name, column] : body_.cell_columns)
       permute(from, column.values, static_cast<std::size_t>(column.components));
     name_elements();
@@ -311,6 +375,8 @@ class Joiner {
   std::vector<std::uint32_t> element_part_, cell_part_;         // (elements), (cells)
   std::vector<std::array<std::int64_t, 8>> cell_points_;        // (cells)
   std::vector<Index3> cell_voxel_;                              // (cells)
+  std::vector<std::uint8_t> ring_;                              // (cells) of add_around()
+  std::vector<std::uint32_t> piece_;                            // (cells) likewise
   std::vector<std::pair<std::uint32_t, std::uint32_t>> under_;  // polygons and their cells
 };
 
@@ -328,6 +394,52 @@ Body join_pieces(const PieceFiles& files, const std::optional<NearSurface>& near
   Body body = joiner.take();
   check(body, files.list);
   return body;
+}
+
+namespace {
+
+// PiecesAround::ring of the cells of a piece beside those asked for, 3: none of them. `own`: points of the cells of ring 0.
+std::vector<std::uint8_t> rings_beside(const PieceBody& piece, std::uint32_t first, std::uint32_t end,
+                                       const Points& own) {
+  std::vector<std::uint8_t> ring(piece.body.cell_count(), 3);
+  std::vector<std::uint8_t> others(ring.size());
+  for (std::size_t c = 0; c < ring.size(); ++c) {
+    const std::uint32_t of = piece_of_cell(piece, c);
+    others[c] = of < first || of >= end;
+    if (others[c] && has_one_of(piece, c, own)) ring[c] = 1;
+  }
+  Points next;
+  add_points(piece, ring, 1, next);
+  for (std::size_t c = 0; c < ring.size(); ++c)
+    if (others[c] && ring[c] == 3 && has_one_of(piece, c, next)) ring[c] = 2;
+  return ring;
+}
+
+}  // namespace
+
+PiecesAround join_around(const PieceFiles& files, std::uint32_t first, std::uint32_t end) {
+  Joiner joiner(files.list, std::nullopt);
+  PiecesAround found;
+  Points own;
+  for (std::uint32_t index = first; index < end; ++index) {
+    check_stop();
+    PieceBody piece = read_piece(files, index);
+    found.first_point = piece.numbers.first_point;
+    std::vector<std::uint8_t> ring(piece.body.cell_count());
+    for (std::size_t c = 0; c < ring.size(); ++c) ring[c] = piece.ghost_cells[c] ? 3 : 0;
+    add_points(piece, ring, 0, own);
+    joiner.add_around(piece, files.files[index], ring);
+  }
+  for (const std::uint32_t index : {first - 1, end}) {
+    if (index >= files.files.size()) continue;  // before the first, too
+    check_stop();
+    PieceBody piece = read_piece(files, index);
+    joiner.add_around(piece, files.files[index], rings_beside(piece, first, end, own));
+  }
+  found.body = joiner.take();
+  joiner.take_rest(found);
+  check(found.body, files.list);
+  return found;
 }
 
 }  // namespace flexel

@@ -18,4 +18,17 @@ struct NearSurface {
 [[nodiscard]] Body join_pieces(const PieceFiles& files, const std::optional<NearSurface>& near = std::nullopt,
                                const std::function<void(const PieceBody& piece)>& see = {});
 
+// What one process holds of a body in pieces: their own cells, and those of two layers around.
+struct PiecesAround {
+  Body body;                         // in the order of every body
+  std::vector<std::int64_t> point;   // (elements) number over all pieces
+  std::vector<std::uint32_t> piece;  // (cells) whose own they are
+  std::vector<std::uint8_t>
+      ring;  // (cells) 0: of the pieces asked for; 1: shares an element with such a cell; 2: with one of those
+  std::vector<std::int64_t> first_point;  // PieceNumbers::first_point
+};
+
+// The pieces from `first` to `end` - 1. Reads them and the two beside them, one after another. Throws InputError as join_pieces does.
+[[nodiscard]] PiecesAround join_around(const PieceFiles& files, std::uint32_t first, std::uint32_t end);
+
 }  // namespace flexel

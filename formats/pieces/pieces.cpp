@@ -159,9 +159,12 @@ SurfaceBeside write_shared_surface(Body& body, const std::string& list, bool com
   alone.notes = body.notes;
   std::swap(alone.surface, body.surface);
   write_body(alone, path, {.compress = compress});
-  const std::uint64_t hash = surface_hash(alone.surface);
   std::swap(alone.surface, body.surface);
-  return {std::filesystem::path(path).filename().string(), hash};
+  return shared_surface(body, list);
+}
+
+SurfaceBeside shared_surface(const Body& body, const std::string& list) {
+  return {std::filesystem::path(shared_surface_path(list)).filename().string(), surface_hash(body.surface)};
 }
 
 std::vector<vtu::HeadArray> write_piece(const PieceBody& piece, const std::string& list,

@@ -56,6 +56,9 @@ struct PieceFiles {
 // Writes the file of the surface of `body`, a body file without elements, under shared_surface_path(list).
 [[nodiscard]] SurfaceBeside write_shared_surface(Body& body, const std::string& list, bool compress = false);
 
+// What that returns, of a surface that another process writes.
+[[nodiscard]] SurfaceBeside shared_surface(const Body& body, const std::string& list);
+
 // Writes a piece under piece_path(list, its index). `surface`: the file that has the surface, in the same folder.
 // Returned are its arrays, which the list declares.
 std::vector<vtu::HeadArray> write_piece(const PieceBody& piece, const std::string& list,

@@ -5,6 +5,7 @@
 
 #include "base/math/greatest.h"
 #include "base/parallel.h"
+#include "formats/pieces/other_pieces.h"
 #include "simulate/gravitation/gravity_tree.h"
 #include "simulate/input/part_names.h"
 #include "simulate/matter/interpolation_weights.h"
@@ -222,8 +223,8 @@ void Gravity::report(const State& state, const std::vector<Vec3>&, SimulateResul
   const double mass = parallel_sum<double>(mass_.size(), [&](std::size_t e) { return mass_[e]; });
   Vec3 first_moment = first_moment_;
   for (std::size_t e = 0; e < mass_.size(); ++e) first_moment += mass_[e] * state.displacement[e];
-  total.force = state.share * mass * acceleration_;
-  total.moment = state.share * first_moment.cross(acceleration_);
+  total.force = state.share * over_pieces(mass) * acceleration_;
+  total.moment = state.share * over_pieces(first_moment).cross(acceleration_);
   if (!sources_.empty()) {
     std::vector<Vec3> forces(mass_.size(), Vec3::Zero());
     add_source_forces(state, forces);

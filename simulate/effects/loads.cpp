@@ -11,6 +11,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "formats/pieces/other_pieces.h"
 #include "simulate/followers/pressing_load.h"
 #include "simulate/followers/turning_load.h"
 #include "simulate/input/scene_selection.h"
@@ -62,7 +63,7 @@ std::vector<SurfacePoint> points_under(const Load& load, const std::vector<std::
   // what turns depends on second moments, which gathered points do not keep
   std::vector<SurfacePoint> points = load.follower ? shared_evenly(problem, surface_points(problem, polygons))
                                                    : gathered_surface_points(problem, polygons);
-  if (!(total_area(points) > 0))
+  if (!(over_pieces(total_area(points)) > 0))
     throw InputError(
         load.origin,
         fmt::format("load \"{}\": no matter lies under the selected surface; use a smaller spacing, or "
@@ -157,7 +158,7 @@ std::vector<LoadedPoint> loaded_elements(const Load& load, const std::vector<std
     loaded.push_back({problem.body.rest[e], volume[e]});
     total += volume[e];
   }
-  if (!(total > 0)) fail_without_matter(load);
+  if (!(over_pieces(total) > 0)) fail_without_matter(load);
   return loaded;
 }
 
@@ -198,7 +199,7 @@ void fail_without_matter(const Load& load) {
 
 Selected loaded_by(const Load& load, const Body& body) {
   Selected selected = resolve(load.where, body);
-  if (!selected.polygons.empty() && !selected.elements.empty())
+  if (!selected.polygons.empty() && over_pieces(static_cast<double>(selected.elements.size())) > 0)
     throw InputError(load.origin,
                      fmt::format("load \"{}\" mixes surface and elements; write two loads", load.name));
   return selected;
@@ -250,7 +251,7 @@ std::optional<Loads> Loads::make(const Parameters& parameters, const Problem& pr
   for (const Load& load : parameters.loads) {
     const Selected selected = loaded_by(load, problem.body);
     Spread made{load.name, load.course, {}, load.torque.has_value() || load.at.has_value()};
-    const bool on_surface = selected.elements.empty();
+    const bool on_surface = !selected.polygons.empty();
     if (load.follower) {
       made.follower = on_surface ? follower_on_surface(load, selected.polygons, problem)
                                  : follower_on_elements(load, selected.elements, problem);
@@ -262,8 +263,9 @@ std::optional<Loads> Loads::make(const Parameters& parameters, const Problem& pr
       add_surface_load(load, selected.polygons, problem, sum);
     else
       add_volume_load(load, selected.elements, problem, sum);
+    if (other_pieces()) other_pieces()->sum_at_elements(sum);  // one force an element, of one process
     for (std::uint32_t e = 0; e < sum.size(); ++e)
-      if (sum[e] != Vec3::Zero()) made.forces.push_back({e, sum[e]});
+      if (sum[e] != Vec3::Zero() && counts_element(e)) made.forces.push_back({e, sum[e]});
     loads.loads_.push_back(std::move(made));
   }
   return loads;
@@ -370,6 +372,8 @@ void Loads::report(const State& state, const std::vector<Vec3>&, SimulateResult&
     for (const ElementForce& at : load.forces)
       add_at(factor * at.force, body_->rest[at.element] + state.displacement[at.element], total.force,
              total.moment);
+    total.force = over_pieces(total.force);
+    total.moment = over_pieces(total.moment);
     if (load.couple)
       total.rotation = turn_of_couple(load.forces.size(), [&](std::size_t i) {
         const ElementForce& at = load.forces[i];

@@ -9,6 +9,7 @@
 #include <map>
 
 #include "base/error.h"
+#include "formats/pieces/other_pieces.h"
 #include "simulate/matter/load_distribution.h"
 #include "simulate/matter/masses.h"
 #include "simulate/matter/surface_points.h"
@@ -39,8 +40,9 @@ void refuse_conflicts(const std::vector<Tie>& ties, const std::vector<Selected>&
   for (std::size_t i = 0; i < ties.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) {
       if (!share_an_axis(ties[i], ties[j]) || same_motion(ties[i], ties[j])) continue;
-      if (intersect(selected[i].polygons, selected[j].polygons) ||
-          intersect(selected[i].elements, selected[j].elements))
+      const bool meet = intersect(selected[i].polygons, selected[j].polygons) ||
+                        intersect(selected[i].elements, selected[j].elements);
+      if (over_pieces(meet ? 1 : 0) > 0)
         throw InputError(ties[i].origin,
                          fmt::format("\"{}\" and \"{}\" ({}) lead the same place to different positions",
                                      ties[i].name, ties[j].name, ties[j].origin));
@@ -136,7 +138,7 @@ void Supports::make_link(Tie& tie, const Selected& selected, const Problem& prob
 void Supports::add_surface_tie(std::uint32_t tie, const std::vector<std::uint32_t>& polygons,
                                const Problem& problem) {
   const std::vector<SurfacePoint> points = shared_evenly(problem, surface_points(problem, polygons));
-  if (!(total_area(points) > 0))
+  if (!(over_pieces(total_area(points)) > 0))
     throw InputError(ties_[tie].origin,
                      fmt::format("\"{}\": no matter lies under the selected surface; use a smaller spacing, "
                                  "or another face where this one is of a crumb that hangs on nothing",
@@ -295,6 +297,7 @@ std::vector<Reaction> Supports::reactions(const State& state, const std::vector<
                                     0);  // an element of two ties counts for the first
   for (std::size_t t = 0; t < ties_.size(); ++t)
     for (const std::uint32_t e : held_elements_[t]) {
+      if (!counts_element(e)) continue;
       Vec3 held = Vec3::Zero();
       for (std::size_t axis = 0; axis < 3; ++axis) {
         if (!ties_[t].axes[axis] || (counted[e] >> axis & 1)) continue;
@@ -303,8 +306,12 @@ std::vector<Reaction> Supports::reactions(const State& state, const std::vector<
       }
       add(t, held, e);
     }
-  for (std::size_t t = 0; t < ties_.size(); ++t)
+  for (std::size_t t = 0; t < ties_.size(); ++t) {
+    places[t] = over_pieces(places[t]);
+    for (Vec3* each : {&reaction[t].force, &reaction[t].moment, &reaction[t].middle})
+      *each = over_pieces(*each);
     if (places[t] > 0) reaction[t].middle /= places[t];
+  }
   return reaction;
 }
 

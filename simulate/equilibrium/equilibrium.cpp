@@ -30,6 +30,7 @@
 #include "base/program/share_scope.h"
 #include "base/stop.h"
 #include "base/units.h"
+#include "formats/pieces/other_pieces.h"
 #include "simulate/equilibrium/load_step_length.h"
 #include "simulate/equilibrium/rigid_link_equilibrium.h"
 #include "simulate/input/scene_words.h"
@@ -162,8 +163,8 @@ class LoadStepping {
   bool branch_off();
   void push(State& state) const;
   [[nodiscard]] bool overloaded() const {
-    return reach_.first > (mechanics_.follows() ? kOutOfProportion : kOverload) *
-                              bounding_box(mechanics_.body().rest).diagonal();
+    return reach_.first >
+           (mechanics_.follows() ? kOutOfProportion : kOverload) * whole_box(mechanics_.body()).diagonal();
   }
   // After an attempt: begins again with free strain in the next mode, where its time has come.
   bool change_free_strain();
@@ -221,8 +222,9 @@ double LoadStepping::out_of_proportion() const {
   State whole = state_;
   whole.share = 1;
   apply(mechanics_.constraints(), mechanics_.body(), whole, whole.displacement);
-  double largest = bounding_box(mechanics_.body().rest).diagonal();
+  double largest = whole_box(mechanics_.body()).diagonal();
   for (const Vec3& moved : whole.displacement) largest = std::max(largest, moved.norm());
+  if (other_pieces()) (void)other_pieces()->take_of_largest(largest, std::span(&largest, 1));
   return kOutOfProportion * largest;
 }
 
@@ -230,7 +232,7 @@ void LoadStepping::refuse_load() const {
   SimulateResult told;
   mechanics_.report(trial_, told);
   constexpr double kCouple = 1e-6;  // of a moment over the size: what rounding leaves of a couple's force
-  const double diagonal = bounding_box(mechanics_.body().rest).diagonal();
+  const double diagonal = whole_box(mechanics_.body()).diagonal();
   double force = 0, moment = 0;
   for (const AppliedLoad& load : told.loads) {
     force += load.force.norm();
@@ -339,7 +341,7 @@ void LoadStepping::diverge() const {
       iterations_left() <= 0
           ? fmt::format(" within {} Newton iterations ([run] newton_iterations)", result_.newton_iterations)
           : "";
-  const double diagonal = bounding_box(body.rest).diagonal();
+  const double diagonal = whole_box(body).diagonal();
   const std::string advice =
       overloaded()
           ? fmt::format(
@@ -360,7 +362,7 @@ void LoadStepping::diverge() const {
 // Linear over the body, in directions that no symmetry of a part is likely to have.
 void LoadStepping::push(State& state) const {
   const Body& body = mechanics_.body();
-  const Box box = bounding_box(body.rest);
+  const Box box = whole_box(body);
   const Vec3 middle = 0.5 * (box.min + box.max), half = 0.5 * (box.max - box.min).cwiseMax(1e-300);
   const std::vector<std::uint32_t> part = element_parts(body);
   const Constraints& constraints = mechanics_.constraints();
@@ -483,8 +485,7 @@ void LoadStepping::solve() {
   const std::vector<Motion>& motions = mechanics_.constraints().motions;
   const bool linked = std::any_of(motions.begin(), motions.end(),
                                   [](const Motion& motion) { return motion.link != nullptr; });
-  if (start_ && first_ == 1 && !linked)
-    reach_.farthest = kFarReach * bounding_box(mechanics_.body().rest).diagonal();
+  if (start_ && first_ == 1 && !linked) reach_.farthest = kFarReach * whole_box(mechanics_.body()).diagonal();
   reach_.hopeless = out_of_proportion();
   while (done_ < 1) {
     refused_ = false;
@@ -523,6 +524,18 @@ FollowerMemory follower_memory(const Mechanics& mechanics) {
 
 namespace {
 
+// Of the whole body's groups the elements that are this process's own. `number`: (elements) of the set of each, here.
+std::vector<std::vector<std::uint32_t>> coupled_over_pieces(const Mechanics& mechanics,
+                                                            std::vector<std::uint32_t> number) {
+  const std::vector<std::uint8_t>& mask = mechanics.constraints().mask;
+  for (std::size_t e = 0; e < number.size(); ++e)
+    if (mask[e] == 7) number[e] = OtherPieces::kNoSet;
+  std::vector<std::vector<std::uint32_t>> groups(other_pieces()->join_sets(number));
+  for (std::uint32_t e = 0; e < number.size(); ++e)
+    if (number[e] != OtherPieces::kNoSet && counts_element(e)) groups[number[e]].push_back(e);
+  return groups;
+}
+
 // Elements that cells couple, but for those that are held in all directions.
 std::vector<std::vector<std::uint32_t>> coupled_by_cells(const Mechanics& mechanics) {
   const Body& body = mechanics.body();
@@ -539,6 +552,7 @@ std::vector<std::vector<std::uint32_t>> coupled_by_cells(const Mechanics& mechan
   }
   const std::vector<std::uint32_t> number = sets.numbered();
   std::vector<std::vector<std::uint32_t>> groups;
+  if (other_pieces()) return coupled_over_pieces(mechanics, number);
   std::vector<std::uint32_t> group(number.size(), 0);  // by set; 0: none yet
   for (std::uint32_t e = 0; e < number.size(); ++e) {
     if (mask[e] == 7) continue;
@@ -554,11 +568,11 @@ std::vector<std::vector<std::uint32_t>> coupled_by_cells(const Mechanics& mechan
 
 std::vector<FreeMotion> free_motions_elsewhere(Mechanics& mechanics, const State& start) {
   CellsElsewhere& cells = *mechanics.elsewhere();
-  return free_motions(
-      MatrixElsewhere{coupled_by_cells(mechanics),
-                      [&](const std::vector<Vec3>& x, std::vector<Vec3>& y) { cells.multiply(x, y); },
-                      cells.diagonal()},
-      node_geometry(mechanics.body(), start));
+  MatrixElsewhere matrix{coupled_by_cells(mechanics),
+                         [&](const std::vector<Vec3>& x, std::vector<Vec3>& y) { cells.multiply(x, y); },
+                         cells.diagonal()};
+  if (other_pieces()) matrix.sum = [](std::span<double> values) { other_pieces()->sum(values); };
+  return free_motions(matrix, node_geometry(mechanics.body(), start));
 }
 
 std::vector<FreeMotion> free_motions_here(Mechanics& mechanics, const State& start) {

@@ -73,6 +73,8 @@ struct LoadStepHooks {
   std::function<LoadStepSolver(Mechanics&)> make_solver;
   std::function<void(const LoadStepDone&)> done;
   std::optional<LoadStepDone> begin;
+  // Of a body in pieces (formats/pieces/other_pieces.h): writes the last state in equilibrium, as a list of pieces.
+  std::function<void(Body&, const std::string& path)> save = {};
 };
 // For a search on a coarser lattice; null where `hooks` is.
 [[nodiscard]] std::shared_ptr<const LoadStepHooks> hooks_on_coarser(

@@ -1,6 +1,7 @@
 // Of centre-placed parts that springs hold.
 #include "simulate/equilibrium/equilibrium_problem.h"
 
+#include "formats/pieces/other_pieces.h"
 #include "simulate/matter/coplanar_elements.h"
 #include "simulate/models/rest_shape.h"
 
@@ -16,6 +17,10 @@ Problem equilibrium_problem(const Body& body, const Scene& scene, const Fragment
                   stray_elements(fragments, body),
                   {},
                   settled_displacement(body)};
+  if (other_pieces()) {
+    problem.stray_cell.assign(body.cell_count(), 0);  // ghosts: what resists is each process's own
+    for (std::uint32_t c = 0; c < body.cell_count(); ++c) problem.stray_cell[c] = !counts_cell(c);
+  }
   const std::vector<std::uint8_t> loose = unsupported_elements(problem);
   for (std::size_t e = 0; e < loose.size(); ++e)
     if (loose[e]) {

@@ -9,6 +9,7 @@
 
 #include "base/math/eigenvalues.h"
 #include "base/parallel.h"
+#include "formats/pieces/other_pieces.h"
 #include "simulate/equilibrium/effect_matrix.h"
 #include "simulate/matter/fragments.h"
 #include "simulate/thermal/free_strain.h"
@@ -163,6 +164,7 @@ Forces Mechanics::forces(const State& state) {
   result.total.assign(body_.element_count(), Vec3::Zero());
   for (const ActiveEffect& effect : effects_)
     effect->add_forces(state, effect.couples.empty() ? result.total : inner);
+  if (other_pieces()) other_pieces()->sum_at_elements(result.total);
   result.smallest = add_forces_of_models(state, inner);
   const double outer = squared_norm(result.total);
   const double held = parallel_sum<double>(inner.size(), [&](std::size_t e) {
@@ -247,6 +249,7 @@ MostCompressed Mechanics::most_compressed(const State& state) const {
   if (body_.cell_count() > 0) {
     const SmallestJacobian cell =
         elsewhere_ ? elsewhere_->figures(state).smallest : cells().smallest_jacobian(state);
+    if (other_pieces()) return {cell.value, "a cell", other_pieces()->rest_of_corner(cell.cell, 0), 0};
     const std::uint32_t element = body_.cell_elements[cell.cell][0];
     most = {cell.value, fmt::format("cell {}", cell.cell), body_.rest[element],
             element_parts(body_)[element]};

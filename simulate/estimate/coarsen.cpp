@@ -17,6 +17,7 @@
 #include "formats/lattice/cell_moments.h"
 #include "formats/lattice/fused_points.h"
 #include "formats/lattice/quadratic_field.h"
+#include "formats/pieces/other_pieces.h"
 #include "simulate/estimate/coarse_grid.h"
 #include "simulate/estimate/coarse_moments.h"
 #include "simulate/matter/joined_parts.h"
@@ -372,10 +373,12 @@ std::vector<Vec3> prolonged_displacement(const Coarsening& coarse, const Body& f
   return moved;
 }
 
-double share_of_thin_walls(const Body& body, double cells) {
-  const FacePairs pairs = face_pairs(body);
+namespace {
+
+// (cells) The thinnest wall of a cell, in cells: along an axis, the fills of the cells in a row.
+std::vector<double> thinnest_walls(const Body& body) {
   std::vector<double> thinnest(body.cell_count(), 1e300);
-  for (const auto& along : pairs) {
+  for (const auto& along : face_pairs(body)) {
     std::vector<std::uint32_t> next(body.cell_count(), ~0u);
     std::vector<std::uint8_t> has_previous(body.cell_count(), 0);
     for (const auto& [low, high] : along) {
@@ -389,12 +392,66 @@ double share_of_thin_walls(const Body& body, double cells) {
       for (std::uint32_t at = c; at != ~0u; at = next[at]) thinnest[at] = std::min(thinnest[at], thickness);
     }
   }
+  return thinnest;
+}
+
+// At cells of others' the values that they have. A cell is known by its first element.
+void exchange_at_cells(const Body& body, std::vector<Vec3>& values) {
+  std::vector<Vec3> at_elements(body.element_count(), Vec3::Zero());
+  for (std::uint32_t c = 0; c < body.cell_count(); ++c)
+    if (counts_cell(c)) at_elements[body.cell_elements[c][0]] += values[c];
+  other_pieces()->sum_at_elements(at_elements);
+  for (std::uint32_t c = 0; c < body.cell_count(); ++c)
+    if (!counts_cell(c)) values[c] = at_elements[body.cell_elements[c][0]];
+}
+
+// (cells) As far as own ones go, of a body in pieces: a row may go on through several. No more than `most` is told apart.
+std::vector<double> thinnest_walls_over_pieces(const Body& body, double most) {
+  const FacePairs pairs = face_pairs(body);
+  std::vector<std::uint8_t> used(body.element_count(), 0);
+  double twice = 0;
+  for (const auto& elements : body.cell_elements) twice += used[elements[0]]++;
+  if (over_pieces(twice) > 0) throw WholeBodyNeeded("two cells in one voxel share an element of it");
+  std::vector<Vec3> after(body.cell_count()),
+      before(body.cell_count());  // of the row, the cell with it, by axis
+  for (std::size_t c = 0; c < after.size(); ++c) after[c] = before[c] = Vec3::Constant(body.fill[c]);
+  for (double changed = 1; changed > 0;) {
+    changed = 0;
+    const auto extend = [&](Vec3& to, const Vec3& by, std::uint32_t cell, Eigen::Index axis) {
+      const double reached = std::min(most, body.fill[cell] + by[axis]);
+      if (!counts_cell(cell) || !(reached > to[axis])) return;
+      to[axis] = reached;
+      ++changed;
+    };
+    for (std::size_t a = 0; a < pairs.size(); ++a) {
+      const auto axis = static_cast<Eigen::Index>(a);
+      for (const auto& [low, high] : pairs[a]) extend(before[high], before[low], high, axis);
+      for (auto pair = pairs[a].rbegin(); pair != pairs[a].rend(); ++pair)
+        extend(after[(*pair)[0]], after[(*pair)[1]], (*pair)[0], axis);
+    }
+    exchange_at_cells(body, after);
+    exchange_at_cells(body, before);
+    changed = over_pieces(changed);
+  }
+  std::vector<double> thinnest(body.cell_count());
+  for (std::size_t c = 0; c < thinnest.size(); ++c)
+    thinnest[c] = (after[c] + before[c]).minCoeff() - body.fill[c];
+  return thinnest;
+}
+
+}  // namespace
+
+double share_of_thin_walls(const Body& body, double cells) {
+  const std::vector<double> thinnest =
+      other_pieces() ? thinnest_walls_over_pieces(body, 2 * cells) : thinnest_walls(body);
   double thin = 0, all = 0;
-  for (std::size_t c = 0; c < body.cell_count(); ++c) {
-    if (body.broken[c]) continue;
+  for (std::uint32_t c = 0; c < body.cell_count(); ++c) {
+    if (body.broken[c] || !counts_cell(c)) continue;
     all += body.fill[c];
     if (thinnest[c] < cells * (1 - 1e-9)) thin += body.fill[c];
   }
+  thin = over_pieces(thin);
+  all = over_pieces(all);
   return all > 0 ? thin / all : 0;
 }
 

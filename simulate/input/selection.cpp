@@ -20,6 +20,7 @@
 #include "base/math/area_vector.h"
 #include "base/nearest_word.h"
 #include "base/units.h"
+#include "formats/pieces/other_pieces.h"
 #include "simulate/input/part_names.h"
 #include "simulate/input/side_places.h"
 
@@ -370,8 +371,8 @@ Selected resolve_region(const Selection& selection, const Body& body, const std:
     for (std::uint32_t e = part.element_begin; e < part.element_end; ++e)
       if (holds(selection, at[e], spacing)) selected.elements.push_back(e);
   }
-  if (selected.elements.empty()) {
-    const Box box = bounding_box(at);
+  if (!(over_pieces(static_cast<double>(selected.elements.size())) > 0)) {
+    const Box box = other_pieces() ? other_pieces()->box() : bounding_box(at);
     throw EmptySelectionError(
         selection.origin,
         fmt::format("the {} holds no element; the elements lie from ({}, {}, {}) to ({}, {}, {}){}",
@@ -389,7 +390,6 @@ std::vector<std::uint32_t> united(const std::vector<std::uint32_t>& a, const std
 }
 
 std::vector<std::uint32_t> without(std::size_t count, const std::vector<std::uint32_t>& left_out) {
-  if (left_out.empty()) return {};
   const std::vector<std::uint32_t> all = range(0, static_cast<std::uint32_t>(count));
   std::vector<std::uint32_t> rest;
   std::set_difference(all.begin(), all.end(), left_out.begin(), left_out.end(), std::back_inserter(rest));
@@ -454,9 +454,11 @@ Selected resolve(const Selection& selection, const Body& body, const std::vector
     }
     case Selection::Kind::complement: {
       const Selected out = resolve(selection.members.front(), body, at);
-      Selected rest = {without(body.surface.polygon_count(), out.polygons),
-                       without(body.element_count(), out.elements)};
-      if (rest.polygons.empty() && rest.elements.empty())
+      Selected rest;
+      if (!out.polygons.empty()) rest.polygons = without(body.surface.polygon_count(), out.polygons);
+      if (over_pieces(static_cast<double>(out.elements.size())) > 0)
+        rest.elements = without(body.element_count(), out.elements);
+      if (!(over_pieces(static_cast<double>(rest.polygons.size() + rest.elements.size())) > 0))
         throw InputError(selection.origin, "\"not\" leaves nothing: what it names is everything");
       return rest;
     }

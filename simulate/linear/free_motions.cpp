@@ -53,6 +53,23 @@ struct Frame {
   }
 };
 
+// Of a group that other processes have rows of, too; `count` becomes how many there are in all. Its reach is the root mean square then.
+Frame group_frame(const Rows& rows, const std::vector<Vec3>& position,
+                  const std::function<void(std::span<double>)>& sum, double& count) {
+  Frame frame;
+  std::array<double, 4> sums{static_cast<double>(rows.size()), 0, 0, 0};
+  for (const std::uint32_t i : rows)
+    for (int axis = 0; axis < 3; ++axis) sums[static_cast<std::size_t>(axis) + 1] += position[i][axis];
+  sum(sums);
+  count = sums[0];
+  frame.centre = Vec3(sums[1], sums[2], sums[3]) / count;
+  double squared = 0;
+  for (const std::uint32_t i : rows) squared += (position[i] - frame.centre).squaredNorm();
+  sum(std::span(&squared, 1));
+  if (squared > 0) frame.reach = std::sqrt(squared / count);
+  return frame;
+}
+
 Frame group_frame(const Rows& rows, const std::vector<Vec3>& position) {
   Frame frame;
   for (const std::uint32_t i : rows) frame.centre += position[i] / static_cast<double>(rows.size());
@@ -81,6 +98,7 @@ struct Work {
 
 // Each group moves about its own centre, one motion after the other: A times all six is never held.
 std::vector<Restriction> restrict_to_rigid(const MatrixElsewhere& matrix, const std::vector<Frame>& frames,
+                                           const std::vector<double>& counts,
                                            const std::vector<Vec3>& position) {
   const std::vector<Rows>& groups = matrix.groups;
   std::vector<Restriction> result(groups.size());
@@ -101,7 +119,7 @@ std::vector<Restriction> restrict_to_rigid(const MatrixElsewhere& matrix, const 
     }
   }
   for (std::size_t g = 0; g < groups.size(); ++g) {
-    const double share = 1 / static_cast<double>(groups[g].size());
+    const double share = 1 / counts[g];
     result[g] += parallel_sum<Restriction>(groups[g].size(), [&](std::size_t r) {
       const std::uint32_t i = groups[g][r];
       const Movements own = frames[g].at(position[i]);
@@ -186,12 +204,23 @@ std::vector<FreeMotion> free_motions(const MatrixElsewhere& matrix, const NodeGe
   std::vector<FreeMotion> motions;
   const std::vector<Rows>& groups = matrix.groups;
   std::vector<Frame> frames;
-  for (const Rows& rows : groups) frames.push_back(group_frame(rows, geometry.position));
-  const std::vector<Restriction> restrictions = restrict_to_rigid(matrix, frames, geometry.position);
+  std::vector<double> counts;
+  for (const Rows& rows : groups) {
+    counts.push_back(static_cast<double>(rows.size()));
+    frames.push_back(matrix.sum ? group_frame(rows, geometry.position, matrix.sum, counts.back())
+                                : group_frame(rows, geometry.position));
+  }
+  std::vector<Restriction> restrictions = restrict_to_rigid(matrix, frames, counts, geometry.position);
+  for (Restriction& each : restrictions) {
+    if (!matrix.sum) break;
+    matrix.sum(std::span(each.energy.data(), 36));
+    matrix.sum(std::span(each.size.data(), 36));
+    matrix.sum(std::span(&each.stiffness, 1));
+  }
   // The energy of a motion of unit mean square size, beside that of one element moved alone.
   for (std::size_t g = 0; g < groups.size(); ++g)
-    tell(free_space(restrictions[g], threshold * restrictions[g].stiffness), geometry.part[groups[g].front()],
-         motions);
+    tell(free_space(restrictions[g], threshold * restrictions[g].stiffness),
+         groups[g].empty() ? 0 : geometry.part[groups[g].front()], motions);
   return motions;
 }
 

@@ -1,6 +1,7 @@
 // Rigid motions that supports leave free.
 #pragma once
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,8 @@ struct MatrixElsewhere {
   std::vector<std::vector<std::uint32_t>> groups;
   std::function<void(const std::vector<Vec3>& x, std::vector<Vec3>& y)> multiply;
   std::vector<Vec3> diagonal;
+  // Where other processes have more rows of the groups: sums over them all. Empty: there are none.
+  std::function<void(std::span<double>)> sum = {};
 };
 [[nodiscard]] std::vector<FreeMotion> free_motions(const MatrixElsewhere& matrix,
                                                    const NodeGeometry& geometry, double threshold = 1e-9);

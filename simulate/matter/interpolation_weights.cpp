@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "base/math/small_matrices.h"
+#include "formats/pieces/other_pieces.h"
 #include "simulate/models/cells.h"
 #include "simulate/models/rest_shape.h"
 
@@ -154,6 +155,7 @@ std::optional<InterpolationWeights> SurfaceCarriers::operator()(const Vec3& poin
   if (locate_) {
     const auto at = (*locate_)(point);
     if (!at || (at->cell < problem_.stray_cell.size() && problem_.stray_cell[at->cell])) return std::nullopt;
+    if (!is_surely_under(problem_.body, *at)) return std::nullopt;
     return cell_carrier(problem_.body, *at);
   }
   const auto element = nearest_(point, outward);

@@ -5,6 +5,7 @@
 
 #include "base/math/dense.h"
 #include "base/math/eigenvalues.h"
+#include "formats/pieces/other_pieces.h"
 
 namespace flexel::simulate {
 namespace {
@@ -20,8 +21,9 @@ std::optional<WeightedMiddle> weighted_middle(const std::vector<LoadedPoint>& po
     middle.total += point.weight;
     middle.place += point.weight * point.position;
   }
+  middle.total = over_pieces(middle.total);
   if (!(middle.total > 0)) return std::nullopt;
-  middle.place /= middle.total;
+  middle.place = over_pieces(middle.place) / middle.total;
   return middle;
 }
 
@@ -35,6 +37,7 @@ std::optional<std::vector<Vec3>> averaging_link(const std::vector<LoadedPoint>& 
     const Vec3 arm = point.position - middle;
     inertia += point.weight * (arm.squaredNorm() * Mat3::Identity() - arm * arm.transpose());
   }
+  inertia = over_pieces(inertia);
   const Vec3 wanted = moment + (at ? Vec3((*at - middle).cross(force)) : Vec3(Vec3::Zero()));
   Vec3 turn = Vec3::Zero();
   if (wanted != Vec3::Zero()) {
@@ -67,6 +70,8 @@ std::optional<std::vector<Vec3>> bearing(const std::vector<LoadedPoint>& points,
     sum += forces.back();
     total += point.weight;
   }
+  sum = over_pieces(sum);
+  total = over_pieces(total);
   const double along = sum.dot(direction);
   if (!(along > 0)) return std::nullopt;
   const double scale = force.norm() / along;
@@ -88,8 +93,9 @@ std::optional<Vec3> turn_of_couple(std::size_t count, const std::function<Loaded
     middle += weight * each.rest;
     moved += weight * each.displacement;
   }
-  middle /= whole;
-  moved /= whole;
+  whole = over_pieces(whole);
+  middle = over_pieces(middle) / whole;
+  moved = over_pieces(moved) / whole;
   Mat3 product = Mat3::Zero();
   for (std::size_t i = 0; i < count; ++i) {
     const LoadedMotion each = at(i);
@@ -98,6 +104,9 @@ std::optional<Vec3> turn_of_couple(std::size_t count, const std::function<Loaded
     moment += arm.cross(each.force);
     arms += arm.norm() * each.force.norm();
   }
+  product = over_pieces(product);
+  moment = over_pieces(moment);
+  arms = over_pieces(arms);
   if (!(moment.norm() > kCouple * arms)) return std::nullopt;
   const NearestRotation nearest = nearest_rotation(product);
   if (!(nearest.values[1] > 1e-9 * nearest.values[0])) return std::nullopt;  // a line

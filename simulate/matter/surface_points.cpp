@@ -13,6 +13,7 @@
 #include <span>
 
 #include "base/parallel.h"
+#include "formats/pieces/other_pieces.h"
 
 namespace flexel::simulate {
 namespace {
@@ -194,10 +195,26 @@ std::vector<SurfacePoint> points_of(const Problem& problem, const std::vector<Sh
   return points;
 }
 
+// Of a body in pieces: what lies under no cell of its own goes with the nearest, however far that is, and each process takes only what
+// is surely its own. Throws WholeBodyNeeded where that is not all.
+std::vector<SurfacePoint> if_complete(const std::vector<Share>& shares, std::vector<SurfacePoint> points) {
+  if (!other_pieces()) return points;
+  constexpr double kRounding = 1e-9;
+  double area = 0;
+  for (const Share& share : shares)
+    if (other_pieces()->polygons_with_cells()[share.polygon])
+      area += 0.5 * (share.corners[1] - share.corners[0]).cross(share.corners[2] - share.corners[0]).norm();
+  const double found = over_pieces(total_area(points));
+  if (std::abs(found - area) > kRounding * area)
+    throw WholeBodyNeeded("some of its surface is further than a cell from any cell under it");
+  return points;
+}
+
 }  // namespace
 
 std::vector<SurfacePoint> surface_points(const Problem& problem, const std::vector<std::uint32_t>& polygons) {
-  return points_of(problem, shares_of(problem.body, polygons));
+  const std::vector<Share> shares = shares_of(problem.body, polygons);
+  return if_complete(shares, points_of(problem, shares));
 }
 
 std::vector<SurfacePoint> surface_points(const Problem& problem, const Triangles& triangles,
@@ -224,7 +241,7 @@ std::vector<SurfacePoint> gathered_surface_points(const Problem& problem,
   std::vector<SurfacePoint> points;
   for (const std::vector<SurfacePoint>& share : gathered)
     points.insert(points.end(), share.begin(), share.end());
-  return points;
+  return if_complete(shares, std::move(points));
 }
 
 std::vector<SurfacePoint> shared_evenly(const Problem& problem, std::vector<SurfacePoint> points) {

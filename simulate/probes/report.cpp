@@ -13,6 +13,7 @@
 #include "base/units.h"
 #include "formats/lattice/column_names.h"
 #include "formats/lattice/fields.h"
+#include "formats/pieces/other_pieces.h"
 #include "simulate/estimate/coarsen.h"
 #include "simulate/input/infill.h"
 #include "simulate/models/connections.h"
@@ -99,9 +100,15 @@ void report_following(bool alone, Progress& progress) {
 }
 
 void measure_displacement(const Body& body, const State& state, SimulateResult& result) {
-  const LargestDisplacement largest = largest_displacement(body, state.displacement);
-  result.largest_displacement = largest.value();
-  result.largest_displacement_at = largest.at;
+  std::optional<SurfacePiece> piece;
+  if (other_pieces())
+    piece.emplace(SurfacePiece{other_pieces()->polygons_with_cells(), other_pieces()->own_vertices()});
+  const LargestDisplacement largest =
+      largest_displacement(body, state.displacement, piece ? &*piece : nullptr);
+  std::array<double, 4> told{largest.value(), largest.at.x(), largest.at.y(), largest.at.z()};
+  if (other_pieces()) (void)other_pieces()->take_of_largest(told[0], told);
+  result.largest_displacement = told[0];
+  result.largest_displacement_at = Vec3(told[1], told[2], told[3]);
 }
 
 // A couple is spread by forces that keep their direction: turned about its axis by an angle, the angle's
@@ -148,9 +155,10 @@ void refuse_not_finite(const SimulateResult& result, const std::string& scene) {
 void measure_corners(const SmallestJacobian& smallest, const Body& body, SimulateResult& result,
                      Progress& progress) {
   constexpr double kNearlyFolded = 0.2;
-  if (smallest.cell >= body.cell_count()) return;
+  if (smallest.cell >= whole_cell_count(body)) return;
   result.smallest_corner_jacobian = smallest.value;
-  result.smallest_corner_at = body.rest[body.cell_elements[smallest.cell][smallest.corner]];
+  result.smallest_corner_at = other_pieces() ? other_pieces()->rest_of_corner(smallest.cell, smallest.corner)
+                                             : body.rest[body.cell_elements[smallest.cell][smallest.corner]];
   if (smallest.value > kNearlyFolded) return;
   const Vec3& at = result.smallest_corner_at;
   progress.warn(
@@ -162,7 +170,13 @@ void measure_corners(const SmallestJacobian& smallest, const Body& body, Simulat
 
 void measure_stress(const Problem& problem, const State& state, Body& body, SimulateResult& result) {
   if (body.cell_count() == 0) return;
-  report_stress(problem, stresses(problem, state), body, result);
+  Stresses found = stresses(problem, state);
+  if (other_pieces()) {
+    other_pieces()->take_from_owners(std::span(found.element.data()->data(), 6 * found.element.size()), 6);
+    other_pieces()->take_from_owners(std::span(found.element_at.data()->data(), 3 * found.element_at.size()),
+                                     3);
+  }
+  report_stress(problem, found, body, result);
   if (result.stress) result.stress->thin_walls = share_of_thin_walls(body, 2);
 }
 
@@ -194,8 +208,14 @@ void write_yield_shares(const std::vector<double>& yields, const std::vector<Sym
 }  // namespace
 
 void report_stress(const Problem& problem, const Stresses& stresses, Body& body, SimulateResult& result) {
-  const std::optional<LargestStress> largest = largest_stress(body, stresses);
+  std::optional<LargestStress> largest = largest_stress(body, stresses);
   if (!largest) return;
+  if (other_pieces()) {
+    std::array<double, 4> told{largest->value, largest->at.x(), largest->at.y(), largest->at.z()};
+    (void)other_pieces()->take_of_largest(told[0], told);
+    largest->value = told[0];
+    largest->at = Vec3(told[1], told[2], told[3]);
+  }
   const std::vector<double> yields = yields_of_parts(body, problem.materials);
   result.stress = StressSummary{largest->value, largest->at, body.parts[largest->part].name, {}};
   result.stress->doubt = largest->doubt;
@@ -220,6 +240,7 @@ double mass_of(const Problem& problem) {
   const std::vector<std::uint32_t> part = cell_parts(problem.body);
   const std::vector<double> share = mass_shares(problem.body), factor = mass_factors(problem.body);
   double mass = parallel_sum<double>(problem.body.cell_count(), [&](std::size_t c) {
+    if (!counts_cell(static_cast<std::uint32_t>(c))) return 0.0;
     return share[c] * problem.materials[part[c]].density * problem.body.parts[part[c]].lattice.spacing.prod();
   });
   for (std::size_t p = 0; p < problem.body.parts.size(); ++p) {
@@ -230,7 +251,7 @@ double mass_of(const Problem& problem) {
                            : whole * std::accumulate(factor.begin() + each.element_begin,
                                                      factor.begin() + each.element_end, 0.0);
   }
-  return mass;
+  return over_pieces(mass);
 }
 
 void add_shares(const std::vector<EffectShare>& shares, std::vector<EffectShare>& all) {

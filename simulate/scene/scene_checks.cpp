@@ -14,6 +14,7 @@
 #include "base/human.h"
 #include "base/math/area_vector.h"
 #include "formats/lattice/locate.h"
+#include "formats/pieces/other_pieces.h"
 #include "simulate/input/scene_words.h"
 
 namespace flexel::simulate {
@@ -60,7 +61,7 @@ HeldMasks held_masks(const std::vector<Tie>& ties, const Body& body) {
     const Selected selected = resolve(tie.where, body);
     for (const std::uint32_t p : selected.polygons) held.polygon[p] |= mask;
     for (const std::uint32_t e : selected.elements) held.element[e] |= mask;
-    held.elements = held.elements || !selected.elements.empty();
+    held.elements = over_pieces(static_cast<double>(selected.elements.size())) > 0 || held.elements;
   }
   return held;
 }
@@ -94,10 +95,10 @@ void for_each_patch(const Body& body, std::uint32_t polygon, const Visit& visit)
   }
 }
 
-// Axes along which the elements under a point of a polygon are held.
+// Axes along which the elements under a point of a polygon are held; 0 where the cell there is another process's.
 std::uint8_t held_under(const HeldMasks& held, const Body& body, std::uint32_t polygon, const Vec3& point) {
   const auto at = locate_on_surface(body, polygon, point);
-  if (!at) return 0;
+  if (!at || !counts_cell(at->cell) || !is_surely_under(body, *at)) return 0;
   std::uint8_t mask = 7;
   for (std::size_t a = 0; a < 8; ++a)
     if (std::abs(at->weights[a]) > kCarries) mask &= held.element[body.cell_elements[at->cell][a]];
@@ -120,23 +121,29 @@ double held_share(const Load& load, const HeldMasks& held, const Body& body) {
   const Vec3 acting = torque != Vec3::Zero()  ? Vec3(Vec3::Ones() - torque.normalized().cwiseAbs())
                       : force == Vec3::Zero() ? Vec3(Vec3::Ones())
                                               : force.normalized();
+  // What polygons hold all processes know, and the first counts it.
+  const bool first = !other_pieces() || other_pieces()->is_first();
   double straight = 0, whole = 0;
-  const auto count = [&](const Vec3& along, std::uint8_t mask) {
-    straight += along_axes(along, mask);
-    whole += along_axes(along, 7);
+  const auto count = [&](const Vec3& along, std::uint8_t mask, bool counts) {
+    if (counts) straight += along_axes(along, mask);
+    if (counts) whole += along_axes(along, 7);
   };
   for (const std::uint32_t p : selected.polygons) {
     const Vec3 area = area_vector(body.surface.vertices, body.surface.polygon(p));
     const Vec3 along = load.pressure && area.norm() > 0 ? area.normalized() : acting;
     if (!held.elements) {
-      count(area.norm() * along, held.polygon[p]);
+      count(area.norm() * along, held.polygon[p], first);
       continue;
     }
     for_each_patch(body, p, [&](const Vec3& middle, double piece) {
-      count(piece * along, static_cast<std::uint8_t>(held.polygon[p] | held_under(held, body, p, middle)));
+      count(piece * along, held.polygon[p], first);
+      const int more = held_under(held, body, p, middle) & ~held.polygon[p] & 7;
+      straight += along_axes(piece * along, static_cast<std::uint8_t>(more));
     });
   }
-  for (const std::uint32_t e : selected.elements) count(acting, held.element[e]);
+  for (const std::uint32_t e : selected.elements) count(acting, held.element[e], counts_element(e));
+  straight = over_pieces(straight);
+  whole = over_pieces(whole);
   return whole > 0 ? straight / whole : 0;
 }
 
@@ -196,6 +203,7 @@ void check_at_odds(const TiedPlace& of_surface, const TiedPlace& of_elements, st
       if ((held_under(held, body, p, middle) & odds) != 0) both += area;
       whole += area;
     });
+  both = over_pieces(both);
   if (!(both > kAtOdds * whole)) return;
   const std::string what = fmt::format(
       "{} \"{}\": a {} of elements {} {} of the place that {}", surface.is_move ? "move" : "fix",
@@ -219,7 +227,8 @@ void check_ties(const std::vector<Tie>& ties, const Body& body, Progress& progre
     for (std::size_t e = 0; e < ties.size(); ++e) {
       const std::uint8_t odds = axes_at_odds(ties[s], ties[e]);
       if (odds == 0 || ties[s].link || ties[e].link) continue;
-      if (place(s).polygons.empty() || place(e).elements.empty()) continue;
+      const bool on_elements = over_pieces(static_cast<double>(place(e).elements.size())) > 0;
+      if (place(s).polygons.empty() || !on_elements) continue;
       check_at_odds({ties[s], place(s)}, {ties[e], place(e)}, odds, body, progress);
     }
 }

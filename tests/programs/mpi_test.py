@@ -1,13 +1,14 @@
 """flexel-simulate-mpi: on 1, 2 and 4 ranks the answer of flexel-simulate; what it refuses; errors and killed ranks end all."""
 
 import json
+import math
 import os
 import pathlib
 import signal
 import subprocess
 import time
 
-from harness import BIN, Skip, expect, expect_error, expect_ok, expect_only, body, box, main, need, run, scene
+from harness import BIN, Skip, binary_stl, box_triangles, expect, expect_error, expect_ok, expect_only, body, box, main, need, run, scene, write
 
 PROGRAM = "flexel-simulate-mpi"
 ENVIRONMENT = dict(os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1", OMPI_MCA_rmaps_base_oversubscribe="1",
@@ -155,6 +156,216 @@ def test_pieces_in_and_out():
     os.replace("list.pvtu", "parts.pvtu")
     os.replace("bent_1.vtu", "parts_1.vtu")
     expect_error(mpi(2, "scene.toml", "parts.pvtu", "-o", "again.pvtu"), PROGRAM, "piece 1", "another run")
+
+
+# Regions inside and across slabs, and all kinds of loads.
+REGIONS = """material = "steel"
+[gravity]
+acceleration = ["0 m/s2", "3 m/s2", "-9.81 m/s2"]
+[[fix]]
+name = "end"
+where = { box = { min = ["-1 mm", "-1 mm", "-1 mm"], max = ["2 mm", "11 mm", "11 mm"] } }
+[[fix]]
+name = "rail"
+where = "ymin"
+axes = "y"
+[[move]]
+name = "led"
+where = { sphere = { centre = ["40 mm", "5 mm", "5 mm"], radius = "4 mm" } }
+displacement = ["free", "free", "0.1 mm"]
+[[load]]
+name = "couple"
+where = "zmax"
+torque = ["0 N m", "0.3 N m", "0.1 N m"]
+[[load]]
+name = "beside"
+where = "ymax"
+force = ["0 N", "20 N", "0 N"]
+at = ["30 mm", "10 mm", "5 mm"]
+[[load]]
+name = "volume"
+where = { box = { min = ["12 mm", "-1 mm", "-1 mm"], max = ["28 mm", "11 mm", "11 mm"] } }
+force = ["7 N", "0 N", "-30 N"]
+[[probe]]
+name = "at a cut"
+at = ["20 mm", "5 mm", "10 mm"]
+[[probe]]
+name = "inside"
+at = ["26.3 mm", "4.1 mm", "7.7 mm"]
+[[probe]]
+name = "side"
+where = "zmax"
+[[probe]]
+name = "all but the end"
+where = { not = { box = { min = ["-1 mm", "-1 mm", "-1 mm"], max = ["2 mm", "11 mm", "11 mm"] } } }
+[run]
+tolerance = 1e-11
+"""
+
+
+def pieces_of(list_name, count):
+    """{place at rest: [(displacement, von Mises stress, place on the ghosts' side)]} of a result in pieces."""
+    found = {}
+    for p in range(count):
+        piece = points(list_name.replace(".pvtu", f"_{p}.vtu"))
+        stress = piece.point_data.get("von_mises", [0] * len(piece.points))
+        for at, moved, von_mises in zip(piece.point_data["rest"], piece.point_data["displacement"], stress):
+            found.setdefault(tuple(round(1e6 * x) for x in at), []).append((moved, von_mises))
+    return found
+
+
+def same_on_pieces(ranks, pieces, text, part="bar.stl", size="2.5 mm", shared=True, stress=True):
+    """A body in pieces of which no rank has the whole: the answer of flexel-simulate, in each piece, ghosts too."""
+    import numpy
+    need_mpi()
+    scene(text=text)
+    options = ("--no-estimate",) if stress else ("--no-estimate", "--no-stress")
+    expect_ok(run("flexel-voxelize", part, "--size", size, "-o", "whole.vtu"))
+    expect_ok(run("flexel-voxelize", part, "--size", size, "--pieces", pieces, "-o", "parts.pvtu"))
+    expect_ok(run("flexel-simulate", "scene.toml", "whole.vtu", "-o", "one.vtu", "--summary", "one.json", "--threads", "1", *options))
+    told = expect_ok(mpi(ranks, "scene.toml", "parts.pvtu", "-o", "all.pvtu", "--summary", "all.json", "--explain", "--force", *options))
+    expect(("puts the body together" not in told.err) == shared, f"shared: {shared}: {told.err}")
+    one, every = points("one.vtu"), pieces_of("all.pvtu", pieces)
+    scale, most = numpy.abs(one.point_data["displacement"]).max(), 0
+    expect(len(every) == len(one.points), f"{len(every)} places in pieces, {len(one.points)} in the whole")
+    loudest = one.point_data["von_mises"].max() if stress else 1
+    for n, at in enumerate(one.point_data["rest"]):
+        for moved, von_mises in every[tuple(round(1e6 * x) for x in at)]:
+            most = max(most, numpy.abs(moved - one.point_data["displacement"][n]).max() / scale)
+            if stress:
+                expect(abs(von_mises - one.point_data["von_mises"][n]) <= 1e-7 * loudest, f"stress at {at}: {von_mises} and {one.point_data['von_mises'][n]}")
+    expect(most <= 1e-8, f"displacements differ by {most:.1e}")
+    a, b = json.loads(pathlib.Path("all.json").read_text()), json.loads(pathlib.Path("one.json").read_text())
+    expect(a.keys() == b.keys(), f"the summary has {set(a) ^ set(b)}")
+    for key in ("elements", "cells", "unknowns", "parts"):
+        expect(a[key] == b[key], f"{key}: {a[key]} and {b[key]}")
+    for kind, values in (("probes", ("displacement", "at")), ("reactions", ("force", "moment", "middle")), ("loads", ("force", "moment"))):
+        expect([each["name"] for each in a[kind]] == [each["name"] for each in b[kind]], f"names of {kind}")
+        for value in values if b[kind] else ():
+            close([each[value] for each in a[kind]], [each[value] for each in b[kind]], 1e-8, f"{value} of {kind}")
+    for x, y in zip(a["loads"], b["loads"]):
+        expect(("rotation" in x) == ("rotation" in y), "turns of couples")
+        if "rotation" in y:
+            close(x["rotation"], y["rotation"], 1e-6, "turn of a couple")
+    for key in ("elastic_energy", "largest_displacement", "mass", "smallest_jacobian", "smallest_corner_jacobian", *(("largest_von_mises",) if stress else ())):
+        close([a[key]], [b[key]], 1e-7, key)
+    if stress:
+        expect(abs(a.get("largest_von_mises_thin_walls", 0) - b.get("largest_von_mises_thin_walls", 0)) < 1e-9, "share of thin walls")
+        expect(a["strength"].keys() == b["strength"].keys(), f"strength: {a['strength']} and {b['strength']}")
+    return a, b
+
+
+def test_no_rank_has_the_whole_on_two_ranks():
+    box("bar.stl")
+    same_on_pieces(2, 2, SMALL)
+    same_on_pieces(2, 4, REGIONS)
+
+
+def test_no_rank_has_the_whole_on_four_ranks():
+    box("bar.stl")
+    same_on_pieces(4, 4, REGIONS)
+
+
+def test_no_rank_has_the_whole_with_large_deflections():
+    box("bar.stl")
+    a, b = same_on_pieces(2, 2, LARGE, size="5 mm")
+    expect(a["newton_iterations"] > 2, f"the case should not be linear: {a}")
+
+
+def arch(name="arch.stl"):
+    """Two legs along z, the longest axis, that a half ring joins: low slabs have two pieces of matter each. The ring cuts cells at every angle."""
+    leg, steps, width = 28.0, 12, 6.0
+
+    def line(radius):
+        turn = [(radius * math.cos(math.pi * (1 - i / steps)), leg + radius * math.sin(math.pi * (1 - i / steps))) for i in range(steps + 1)]
+        return [(-radius, 0.0), *turn, (radius, 0.0)]
+
+    inner, outer = line(7.3), line(12.1)
+    at = lambda point, y: (point[0], y, point[1])  # noqa: E731
+    quads = [[at(inner[0], 0), at(outer[0], 0), at(outer[0], width), at(inner[0], width)], [at(outer[-1], 0), at(inner[-1], 0), at(inner[-1], width), at(outer[-1], width)]]
+    for i in range(len(inner) - 1):
+        a, b, c, d = inner[i], inner[i + 1], outer[i + 1], outer[i]
+        quads += [[at(a, 0), at(b, 0), at(c, 0), at(d, 0)], [at(d, width), at(c, width), at(b, width), at(a, width)], [at(d, 0), at(c, 0), at(c, width), at(d, width)],
+                  [at(b, 0), at(a, 0), at(a, width), at(b, width)]]
+    return write(name, binary_stl([[q[0], q[2], q[1]] for q in quads] + [[q[0], q[3], q[2]] for q in quads]))
+
+
+ARCH = """material = "PLA"
+[gravity]
+acceleration = ["0 m/s2", "3 m/s2", "-9.81 m/s2"]
+[[fix]]
+where = "zmin"
+[[load]]
+name = "pressed"
+where = "zmax"
+pressure = "50 kPa"
+[[load]]
+name = "pushed"
+where = "xmax"
+force = ["-2 N", "1 N", "0 N"]
+[[probe]]
+name = "crown"
+at = ["0 mm", "3 mm", "40 mm"]
+[[probe]]
+name = "off the surface"
+at = ["12.3 mm", "3 mm", "14 mm"]
+[run]
+tolerance = 1e-11
+"""
+
+
+def test_no_rank_has_the_whole_of_a_curved_part():
+    same_on_pieces(2, 2, ARCH, part=arch(), size="1.7 mm")
+    same_on_pieces(3, 3, ARCH, part=arch(), size="2.3 mm")
+
+
+def test_one_rank_puts_together_what_takes_the_whole():
+    """Two blocks apart: each piece has matter of both, and only the whole says that they are two."""
+    need_mpi()
+    box("bar.stl")
+    far = [[(x, y + 30, z) for x, y, z in triangle] for triangle in box_triangles((40.0, 10.0, 10.0))]
+    write("two.stl", binary_stl(box_triangles((40.0, 10.0, 10.0)) + far))
+    a, _ = same_on_pieces(2, 2, SMALL, part="two.stl", size="5 mm", shared=False)
+    expect(a["largest_displacement"] > 0, "it moves")
+    told = expect_ok(mpi(2, "scene.toml", "parts.pvtu", "-o", "all.pvtu", "--no-estimate", "--force", "--verbose"))
+    expect("several pieces" in told.err, f"why is said: {told.err}")
+
+
+def test_errors_on_pieces_are_told_once_and_end_all_ranks():
+    need_mpi()
+    box("bar.stl")
+    expect_ok(run("flexel-voxelize", "bar.stl", "--size", "5 mm", "--pieces", "2", "-o", "parts.pvtu"))
+    expect_ok(run("flexel-voxelize", "bar.stl", "--size", "4 mm", "--pieces", "2", "-o", "other.pvtu"))
+    files = {"scene.toml", "bar.stl", *(f"{name}{end}" for name in ("parts", "other") for end in (".pvtu", "_0.vtu", "_1.vtu", "_surface.vtu"))}
+    command = ("scene.toml", "parts.pvtu", "-o", "bent.pvtu", "--no-estimate")
+    load = '[[load]]\nwhere = "xmax"\nforce = ["0 N", "0 N", "-1 N"]\n'
+    nowhere = '{ box = { min = ["90 mm", "0 mm", "0 mm"], max = ["91 mm", "1 mm", "1 mm"] } }'
+    for text, words in (('material = "steel"\n' + load, ["nothing holds part"]), (SMALL + "[[fix]]\nwhere = " + nowhere + "\n", ["holds no element", "40 mm"]),
+                        (SMALL + '[[probe]]\nname = "off"\nat = ["60 mm", "0 mm", "0 mm"]\n', ["off", "20 mm outside"]),
+                        ('material = "steel"\n[[fix]]\nwhere = "xmin"\naxes = "x"\n' + load, ["is free to translate along y"])):
+        scene(text=text)
+        expect_error(mpi(2, *command), PROGRAM, *words)
+        expect_only(*files)
+    scene(text=SMALL)
+    os.replace("parts_1.vtu", "kept")
+    expect_error(mpi(2, *command), PROGRAM, "piece 1 of 2", "parts_1.vtu", "is missing")
+    os.replace("other_1.vtu", "parts_1.vtu")
+    expect_error(mpi(2, *command), PROGRAM, "piece 1", "another run")
+    os.replace("kept", "parts_1.vtu")
+    os.mkdir("bent_1.vtu")
+    expect_error(mpi(2, *command), PROGRAM, "bent_1.vtu")
+    os.rmdir("bent_1.vtu")
+    expect_only(*(files - {"other_1.vtu"}))
+
+
+def test_the_last_equilibrium_of_pieces_is_kept_in_pieces():
+    need_mpi()
+    box("bar.stl")
+    scene(text='material = "rubber"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = ["0 N", "0 N", "-60 N"]\n[run]\nload_steps = 4\nnewton_iterations = 6\n')
+    expect_ok(run("flexel-voxelize", "bar.stl", "--size", "5 mm", "--pieces", "2", "-o", "parts.pvtu"))
+    expect_error(mpi(2, "scene.toml", "parts.pvtu", "-o", "bent.pvtu", "--no-estimate"), PROGRAM, "bent.failed.pvtu", code=3)
+    expect(not pathlib.Path("bent.pvtu").exists(), "no result")
+    expect_ok(run("flexel-map", "bent.failed.pvtu", "-o", "failed.stl"))
 
 
 def test_options_of_petsc():

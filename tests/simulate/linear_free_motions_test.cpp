@@ -2,6 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <barrier>
+#include <thread>
+
 #include "tests/simulate/voxel_problem.h"
 
 namespace flexel::simulate::test {
@@ -76,6 +79,69 @@ TEST(FreeMotions, ASliderKeepsTheDirectionsAlongIt) {
   EXPECT_NEAR(motions[0].translation[0], 1, 1e-9);
   EXPECT_NEAR(motions[1].translation[1], 1, 1e-9);
   EXPECT_NEAR(std::abs(motions[2].rotation[2]), 1, 1e-6);
+}
+
+// Two that run the same, each with half of the rows, on threads.
+class Pair {
+ public:
+  explicit Pair(const BlockMatrix& matrix)
+      : matrix_(matrix), given_{std::vector<Vec3>(matrix.rows()), std::vector<Vec3>(matrix.rows())} {}
+
+  std::vector<FreeMotion> motions(const NodeGeometry& geometry) {
+    std::array<std::vector<FreeMotion>, 2> found;
+    std::thread other([&] { found[1] = half(1, geometry); });
+    found[0] = half(0, geometry);
+    other.join();
+    EXPECT_EQ(found[0].size(), found[1].size());
+    for (std::size_t m = 0; m < found[0].size(); ++m) {
+      EXPECT_EQ(found[0][m].translation, found[1][m].translation);
+      EXPECT_EQ(found[0][m].rotation, found[1][m].rotation);
+    }
+    return found[0];
+  }
+
+ private:
+  std::vector<FreeMotion> half(std::uint32_t which, const NodeGeometry& geometry) {
+    MatrixElsewhere own{{{}}, {}, {}, {}};
+    for (std::uint32_t i = which; i < matrix_.rows(); i += 2) own.groups[0].push_back(i);
+    for (std::size_t i = 0; i < matrix_.rows(); ++i)
+      own.diagonal.emplace_back(matrix_.values[diagonal_position(matrix_, i)].diagonal());
+    own.multiply = [&, which](const std::vector<Vec3>& x, std::vector<Vec3>& y) {
+      given_[which] = x;
+      together_.arrive_and_wait();
+      std::vector<Vec3> all(x.size());
+      for (std::size_t i = 0; i < x.size(); ++i) all[i] = given_[i % 2][i];
+      multiply(StoredMatrix(matrix_), all, y);
+      together_.arrive_and_wait();
+    };
+    own.sum = [&, which](std::span<double> values) {
+      sums_[which].assign(values.begin(), values.end());
+      together_.arrive_and_wait();
+      for (std::size_t i = 0; i < values.size(); ++i) values[i] = sums_[0][i] + sums_[1][i];
+      together_.arrive_and_wait();
+    };
+    return free_motions(own, geometry);
+  }
+
+  const BlockMatrix& matrix_;
+  std::array<std::vector<Vec3>, 2> given_;
+  std::array<std::vector<double>, 2> sums_;
+  std::barrier<> together_{2};
+};
+
+TEST(FreeMotions, AreThoseOfRowsThatProcessesShareOut) {
+  for (const bool hinged : {false, true}) {
+    VoxelProblem problem = assemble(carve({40, 6, 4}), 1e-3);
+    if (hinged) pin(problem, [](const Index3& index) { return index[0] == 0 && index[2] == 0; });
+    const std::vector<FreeMotion> whole = free_motions(problem.matrix, problem.geometry);
+    const std::vector<FreeMotion> shared = Pair(problem.matrix).motions(problem.geometry);
+    EXPECT_EQ(whole.size(), hinged ? 1u : 6u);
+    ASSERT_EQ(shared.size(), whole.size());
+    for (std::size_t m = 0; m < whole.size(); ++m) {
+      EXPECT_NEAR((shared[m].translation - whole[m].translation).norm(), 0, 1e-6);
+      EXPECT_NEAR((shared[m].rotation.cross(whole[m].rotation)).norm(), 0, 1e-6);
+    }
+  }
 }
 
 TEST(FreeMotions, AreToldPartByPart) {

@@ -2,7 +2,9 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <map>
 #include <numeric>
+#include <set>
 
 #include "base/error.h"
 #include "formats/lattice/body_file.h"
@@ -189,6 +191,80 @@ TEST(Slabs, OfTwoPartsAreCutEachAlongItsOwnAxis) {
     (void)write_all(parts, options_of(each, pieces), list);
     EXPECT_TRUE(body_bytes(join_pieces(read_piece_list(list))) ==
                 body_bytes(whole_of(parts, options_of(each, pieces)).body));
+  }
+}
+
+// A cell by the places of its elements.
+using ElementPlace = std::tuple<int, int, int, int>;
+using CellPlace = std::array<ElementPlace, 8>;
+CellPlace place_of_cell(const Body& body, std::uint32_t cell) {
+  CellPlace place;
+  for (std::size_t a = 0; a < 8; ++a) {
+    const std::uint32_t e = body.cell_elements[cell][a];
+    const Index3& at = body.lattice_index[e];
+    place[a] = {at[0], at[1], at[2], body.piece[e]};
+  }
+  return place;
+}
+
+// 0, 1 or 2 as PiecesAround has it, 3 elsewhere; from the whole body alone.
+std::vector<std::uint8_t> rings_of(const Body& whole, const std::vector<bool>& own) {
+  std::vector<std::uint8_t> ring(whole.cell_count(), 3);
+  std::vector<bool> reached(whole.element_count(), false);
+  for (std::uint8_t r = 0; r < 3; ++r) {
+    for (std::size_t c = 0; c < ring.size(); ++c) {
+      const auto& corners = whole.cell_elements[c];
+      const bool next =
+          std::any_of(corners.begin(), corners.end(), [&](std::uint32_t e) { return reached[e]; });
+      if (ring[c] == 3 && (r == 0 ? own[c] : next)) ring[c] = r;
+    }
+    for (std::size_t c = 0; c < ring.size(); ++c)
+      if (ring[c] == r)
+        for (const std::uint32_t e : whole.cell_elements[c]) reached[e] = true;
+  }
+  return ring;
+}
+
+// Of the cells with ring < 3: place, ring, whose they are, fill, and the polygons that they lie under.
+using CellsAround =
+    std::map<CellPlace, std::tuple<std::uint8_t, std::uint32_t, double, std::vector<std::uint32_t>>>;
+CellsAround cells_around(const Body& body, const std::vector<std::uint8_t>& ring,
+                         const std::vector<std::uint32_t>& piece) {
+  std::vector<std::vector<std::uint32_t>> under(body.cell_count());
+  for (std::uint32_t p = 0; p < body.surface.polygon_count(); ++p)
+    for (std::uint32_t i = body.surface_cell_offsets[p]; i < body.surface_cell_offsets[p + 1]; ++i)
+      under[body.surface_cells[i]].push_back(p);
+  CellsAround cells;
+  for (std::uint32_t c = 0; c < body.cell_count(); ++c)
+    if (ring[c] < 3) cells[place_of_cell(body, c)] = {ring[c], piece[c], body.fill[c], under[c]};
+  return cells;
+}
+
+TEST(Slabs, SomePiecesComeWithTwoRingsOfCellsAround) {
+  for (const Case& each : cases()) {
+    SCOPED_TRACE(each.name);
+    const Scratch scratch;
+    const std::string list = scratch.path("body.pvtu");
+    (void)write_all(surface(each.mesh), options_of(each, 3), list);
+    const PieceFiles files = read_piece_list(list);
+    const Body whole = join_pieces(files);
+    std::map<CellPlace, std::uint32_t> owner;
+    for (std::uint32_t r = 0; r < 3; ++r) {
+      const PieceBody piece = read_piece(files, r);
+      for (std::uint32_t c = 0; c < piece.body.cell_count(); ++c)
+        if (!piece.ghost_cells[c]) owner[place_of_cell(piece.body, c)] = r;
+    }
+    std::vector<std::uint32_t> piece;
+    for (std::uint32_t c = 0; c < whole.cell_count(); ++c) piece.push_back(owner.at(place_of_cell(whole, c)));
+    for (const auto& [first, end] : {std::pair(0u, 1u), {1u, 2u}, {2u, 3u}, {0u, 2u}, {0u, 3u}}) {
+      std::vector<bool> own;
+      for (const std::uint32_t of : piece) own.push_back(of >= first && of < end);
+      const PiecesAround found = join_around(files, first, end);
+      EXPECT_TRUE(cells_around(found.body, found.ring, found.piece) ==
+                  cells_around(whole, rings_of(whole, own), piece));
+      EXPECT_EQ(found.point.size(), found.body.element_count());
+      EXPECT_EQ(std::set(found.point.begin(), found.point.end()).size(), found.point.size());
+    }
   }
 }
 
