@@ -53,6 +53,17 @@ void plan_lattice(const JobArguments& arguments, Job& job) {
   job.voxelize.heal = voxelize::heal_choice(arguments.heal);
 }
 
+namespace {
+
+// Its cells are cubes.
+bool asks_for_springs(const simulate::Scene& scene) {
+  return scene.model == "springs" ||
+         std::any_of(scene.parts.begin(), scene.parts.end(),
+                     [](const auto& part) { return part.second.model == "springs"; });
+}
+
+}  // namespace
+
 Job plan_job(const JobArguments& arguments) {
   Job job;
   if (std::count(arguments.parts.begin(), arguments.parts.end(), "-") + (arguments.scene == "-") > 1)
@@ -65,6 +76,7 @@ Job plan_job(const JobArguments& arguments) {
   job.voxelize.placement = voxelize::placement_choice(arguments.placement);
   plan_scene(arguments, job);
   job.voxelize.moments = simulate::asks_for_quadratic(job.scene);
+  job.voxelize.cubic = asks_for_springs(job.scene);
   return job;
 }
 

@@ -243,7 +243,8 @@ Part placed_part(HealedPart& healed, double spacing, const VoxelizeOptions& opti
   part.name = name;
   part.material = options.material;
   part.placement = options.placement;
-  part.lattice = align_lattice(healed.mesh, spacing, options.align, options.placement == Placement::centre);
+  part.lattice = align_lattice(healed.mesh, spacing, options.align,
+                               options.cubic || options.placement == Placement::centre);
   place_on_lattice(healed.mesh, part.lattice);
   return part;
 }

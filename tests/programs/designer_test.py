@@ -259,5 +259,16 @@ def test_compare_says_of_which_file_it_speaks():
     expect("new/a.stl is" in both and "times as stiff as a.stl" in both, both)
 
 
+def test_compare_tells_what_layers_bear():
+    """As flexel deform does. A couple out of all proportion is refused as what it is, not by what rounding leaves of its forces."""
+    write("a.stl", binary_stl(box_triangles((40, 10, 10))))
+    case = ["--material", "PLA", "--size", "2.5 mm", "--fix", "xmin"]
+    text = expect_ok(run("flexel", "compare", "a.stl", "a.stl", *case, "--push", "xmax: 0 0 -100 N")).out.decode()
+    told = expect_ok(run("flexel", "deform", "a.stl", *case, "--push", "xmax: 0 0 -100 N", "-o", "o.stl")).err
+    factors = told.split("safety factor ")[1].split(" across printed layers")[0].split(" (")
+    expect(f"{factors[0]} against yield, {factors[1]} across layers" in text, text + told)
+    expect_error(run("flexel", "deform", "a.stl", *case, "--torque", "xmax: 0 50 0 kN m", "-o", "o.stl", "--force"), "flexel", "the load (50,000 N m in all)", code=3)
+
+
 if __name__ == "__main__":
     main(globals())

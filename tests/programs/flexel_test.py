@@ -6,6 +6,7 @@ import re
 import struct
 
 from harness import binary_stl, bracket, box, box_triangles, expect, expect_error, expect_ok, expect_only, main, run, scene, write
+from shapes import obj_bar
 
 CASE = ["--material", "steel", "--fix", "xmin", "--push", "xmax: 0 0 -100 N", "--count", "4000"]
 
@@ -190,6 +191,23 @@ def test_options_that_nothing_takes_are_refused():
     write("m.toml", 'model = "cells"\n')
     refused = run("flexel", "study", "box.stl", "--scene", "m.toml", "--model", "springs", "--material", "steel", "--gravity", "1 g", "-o", "st")
     expect_error(refused, "flexel", "m.toml: has model already: leave --model out")
+
+
+def test_springs_have_cubic_cells():
+    """Whatever the size is, along a part that is turned too; and the answer is that of cells, where Poisson's ratio is 1/4."""
+    write("gum.toml", 'material = "gum"\n[materials.gum]\nyoung = "1 GPa"\npoisson = 0.25\ndensity = "1000 kg/m3"\n[[fix]]\nwhere = "bar/held"\n'
+          '[[load]]\nwhere = "bar/end"\nforce = ["0 N", "0 N", "-10 N"]\n')
+    for degrees in (0, 33):
+        write("bar.obj", obj_bar((40, 12, 9), degrees)[0])
+        found = {}
+        for model in ("cells", "springs"):
+            expect_ok(run("flexel", "deform", "bar.obj", "--scene", "gum.toml", "--model", model, "--size", "1.7 mm", "--no-estimate", "-o", "o.stl", "--force",
+                          "--summary", "s.json"))
+            told = json.load(open("s.json", encoding="utf-8"))
+            found[model] = told["simulate"]["largest_displacement"]
+        sides = told["voxelize"]["parts"][0]["spacing"]
+        expect(max(sides) - min(sides) < 1e-9, sides)
+        expect(abs(found["springs"] / found["cells"] - 1) < 0.1, found)  # of cut cells
 
 
 if __name__ == "__main__":

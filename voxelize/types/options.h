@@ -30,6 +30,7 @@ struct VoxelizeOptions {
   std::function<double(double)> rounded = {};
   Placement placement = Placement::corner;
   Align align = Align::snap;
+  bool cubic = false;      // no part's lattice is stretched (elements at voxel centres: never)
   std::size_t pieces = 0;  // that the lattice is cut into, one after another; 0: it is made as a whole
   bool moments = false;    // also the exact moments of cut cells (Body::moments); corner placement
   HealChoice heal;
