@@ -197,7 +197,8 @@ def memory_fit(results):
 def billion(results, in_pieces):
     """`in_pieces`: of runs in which no rank had the whole."""
     _, whole, _ = memory_fit(results)
-    piece, beside, base = memory_fit(in_pieces)
+    piece, _, base = memory_fit(in_pieces)
+    more = max(found["memory"][0] - max(found["memory"][1:]) for _, found in in_pieces)
     cells, ranks = 1e9, 1000
     each = cells / ranks
     side = (cells / 4) ** (1 / 3)
@@ -211,7 +212,7 @@ def billion(results, in_pieces):
 |---|---|---|
 | cells a rank | {each:,.0f} | 1e9 / 1,000 |
 | memory a rank, its piece | {(base + piece * each) / 1e9:.1f} GB | {base / 1e6:,.0f} MB and {piece:,.0f} bytes a cell: the difference of the largest and the smallest rank above |
-| memory of rank 0 besides, body in pieces | {beside * cells / 1e9:,.0f} GB | {beside:,.0f} bytes a cell of the whole body, rank 0 above less its piece |
+| memory of rank 0 besides, body in pieces | none | it has its own pieces, as the others; above it took {more / 1e6:,.0f} MB more than the largest of them at most |
 | memory of rank 0 besides, body in one file | {whole * cells / 1e9:,.0f} GB | {whole:,.0f} bytes a cell of the whole body, rank 0 above less its piece |
 | bytes a product and rank, finest level | {2 * face / 1e6:.1f} MB | two faces of {side:,.0f} x {side:,.0f} elements, 24 bytes each |
 | bytes a tangent and rank | {2 * 72 * side * side / 1e6:.1f} MB | a block of 72 bytes an element of those faces |
