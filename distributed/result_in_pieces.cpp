@@ -41,9 +41,14 @@ Places places_of_cells(const Body& piece, const Body& whole, const Places& eleme
     for (std::uint32_t c = piece.parts[p].cell_begin; c < piece.parts[p].cell_end; ++c) {
       std::array<std::uint32_t, 8> corners = piece.cell_elements[c];
       for (std::uint32_t& corner : corners) corner = elements[corner];
+      // Several cells of one voxel are in no order.
+      const auto voxel = [&](const auto& of) {
+        const Index3& at = whole.lattice_index[of[0]];
+        return std::tuple(at[2], at[1], at[0]);
+      };
       auto at = std::lower_bound(whole.cell_elements.begin() + whole.parts[p].cell_begin, end, corners,
-                                 [](const auto& a, const auto& b) { return a[0] < b[0]; });
-      while (at != end && (*at)[0] == corners[0] && *at != corners) ++at;
+                                 [&](const auto& a, const auto& b) { return voxel(a) < voxel(b); });
+      while (at != end && voxel(*at) == voxel(corners) && *at != corners) ++at;
       if (at == end || *at != corners) throw std::logic_error("a cell of a piece is not in the whole");
       places.push_back(static_cast<std::uint32_t>(at - whole.cell_elements.begin()));
     }

@@ -125,20 +125,34 @@ def memory_words(found):
 
 def memory_table(folder, cases):
     print("\n## Memory\n\nPeak of each process (the kernel's ru_maxrss). Base: what a rank takes for a bar of 16 cells, which is PETSc, MPI and the program. Share: the largest "
-          "rank's peak times the ranks over the peak of one rank alone, both less their base: 1 is what cutting can give at best, 1.3 is asked. Of one file (`.vtu`) rank 0 has the "
-          "whole body besides its cells; of as many pieces as ranks (`.pvtu`) no rank has.\n")
+          "rank's peak times the ranks over the peak of one rank alone, both less their base: 1 is what cutting can give at best, 1.3 is asked. Of a body in one file rank 0 has the whole besides its cells.\n")
     base = {ranks: max(solve(folder, bar(folder, (16, 1, 1)), ranks)["memory"]) for ranks in RANKS}
-    head("cells", "body", "ranks", "base MB", "MB of rank 0", "MB of the largest other", "share")
-    results, in_pieces = [], []
+    head("cells", "ranks", "base MB", "MB of rank 0", "MB of the largest other", "share")
+    results = []
     for sides in cases:
         one = None
-        for ranks, pieces in ((1, 0), (2, 0), (4, 0), (2, 2), (4, 4)):
-            found = solve(folder, bar(folder, sides, pieces), ranks)
-            (in_pieces if pieces else results).append((sides, found))
+        for ranks in RANKS:
+            found = solve(folder, bar(folder, sides), ranks)
+            results.append((sides, found))
             own = max(found["memory"]) - base[ranks]
             one = one or own
-            row(f"{found['cells']:,}", f"{pieces} pieces" if pieces else "one file", ranks, f"{base[ranks] / 1e6:,.0f}", *memory_words(found), f"{own * ranks / one:.2f}")
-    return results, in_pieces
+            row(f"{found['cells']:,}", ranks, f"{base[ranks] / 1e6:,.0f}", *memory_words(found), f"{own * ranks / one:.2f}")
+    return results
+
+
+def pieces_table(folder, cases):
+    print("\n## Memory of a body in pieces\n\nAs many pieces as ranks (`.pvtu`): no rank has the whole ([guide/mpi.md](../guide/mpi.md#where-no-rank-has-the-whole)). Each has its own "
+          "cells, their elements and two layers of cells beside them, besides what is made of its cells. Base and share as above, one rank being that of one file.\n")
+    head("cells", "ranks", "base MB", "MB of rank 0", "MB of the largest other", "share")
+    results = []
+    for sides in cases:
+        alone = solve(folder, bar(folder, sides), 1)["memory"][0] - solve(folder, bar(folder, (16, 1, 1)), 1)["memory"][0]
+        for ranks in RANKS[1:]:
+            base = max(solve(folder, bar(folder, (16, 1, 1), ranks), ranks)["memory"])
+            found = solve(folder, bar(folder, sides, ranks), ranks)
+            results.append((sides, found))
+            row(f"{found['cells']:,}", ranks, f"{base / 1e6:,.0f}", *memory_words(found), f"{(max(found['memory']) - base) * ranks / alone:.2f}")
+    return results
 
 
 def scaling_table(folder, title, words, cases):
@@ -181,9 +195,10 @@ def memory_fit(results):
 
 
 def billion(results, in_pieces):
-    """`in_pieces`: of runs in which no rank had the whole; none: their figures are left out."""
+    """`in_pieces`: of runs in which no rank had the whole."""
     _, whole, _ = memory_fit(results)
-    piece, beside, base = memory_fit(in_pieces or results)
+    piece, _, base = memory_fit(in_pieces)
+    more = max(found["memory"][0] - max(found["memory"][1:]) for _, found in in_pieces)
     cells, ranks = 1e9, 1000
     each = cells / ranks
     side = (cells / 4) ** (1 / 3)
@@ -197,7 +212,7 @@ def billion(results, in_pieces):
 |---|---|---|
 | cells a rank | {each:,.0f} | 1e9 / 1,000 |
 | memory a rank, its piece | {(base + piece * each) / 1e9:.1f} GB | {base / 1e6:,.0f} MB and {piece:,.0f} bytes a cell: the difference of the largest and the smallest rank above |
-| memory of rank 0 besides, body in pieces | {f'{beside * cells / 1e9:,.0f} GB | {beside:,.0f} bytes a cell of the whole body, likewise' if in_pieces else '- | not measured'} |
+| memory of rank 0 besides, body in pieces | none | it has its own pieces, as the others; above it took {more / 1e6:,.0f} MB more than the largest of them at most |
 | memory of rank 0 besides, body in one file | {whole * cells / 1e9:,.0f} GB | {whole:,.0f} bytes a cell of the whole body, rank 0 above less its piece |
 | bytes a product and rank, finest level | {2 * face / 1e6:.1f} MB | two faces of {side:,.0f} x {side:,.0f} elements, 24 bytes each |
 | bytes a tangent and rank | {2 * 72 * side * side / 1e6:.1f} MB | a block of 72 bytes an element of those faces |
@@ -241,7 +256,7 @@ def event_seconds(log, name):
 def main():
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("--large", action="store_true", help="a million cells too")
-    arguments.add_argument("--last", action="store_true", help="only the sections after Memory")
+    arguments.add_argument("--last", action="store_true", help="only the sections after the first on memory")
     arguments.add_argument("--ex56", type=pathlib.Path, help="source of PETSc's example ksp/tutorials/ex56.c (Debian's libpetsc3.18-dev-examples has it)")
     options = arguments.parse_args()
     with tempfile.TemporaryDirectory() as place:
@@ -251,10 +266,11 @@ def main():
 Printed by `bench/scale/scale.py{' --large' if options.large else ''}` on {os.cpu_count()} cores ({processor_name()}), load average {os.getloadavg()[0]:.1f} when it began. A bar of steel, 4:1:1, held at one end, with a small
 load across the other; `flexel-simulate-mpi` without error bars and stresses. Wall and linear seconds are those of a machine with that load; more ranks than cores
 share them.""")
-        large, in_pieces = [], []
+        large = []
         if not options.last:
             hierarchy_table(folder, [(56, 14, 14), (116, 29, 29)] + ([(252, 63, 63)] if options.large else []))
-            large, in_pieces = memory_table(folder, [(56, 14, 14), (116, 29, 29), (168, 42, 42)])
+            large = memory_table(folder, [(56, 14, 14), (116, 29, 29), (168, 42, 42)])
+        in_pieces = pieces_table(folder, [(56, 14, 14), (116, 29, 29)])
         results = scaling_table(folder, "Strong scaling", "The same body on more ranks.", [((88, 22, 22), ranks) for ranks in (1, 2, 4)])
         results += scaling_table(folder, "Weak scaling", "As many cells for each rank: the bar grows along its length.",
                                  [((40 * ranks, 16, 16), ranks) for ranks in (1, 2, 4)])

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <set>
 #include <tuple>
 
 #include "base/error.h"
@@ -398,9 +399,18 @@ Body join_pieces(const PieceFiles& files, const std::optional<NearSurface>& near
 
 namespace {
 
-// PiecesAround::ring of the cells of a piece beside those asked for, 3: none of them. `own`: points of the cells of ring 0.
+using CellPoints = std::array<std::int64_t, 8>;  // numbers
+
+CellPoints points_of_cell(const PieceBody& piece, std::size_t cell) {
+  CellPoints points{};
+  for (std::size_t a = 0; a < 8; ++a) points[a] = piece.global_point[piece.body.cell_elements[cell][a]];
+  return points;
+}
+
+// PiecesAround::ring of the cells of a piece beside those asked for, 3: none of them. `own`: points of the cells of ring 0;
+// `ghosts`: of those pieces.
 std::vector<std::uint8_t> rings_beside(const PieceBody& piece, std::uint32_t first, std::uint32_t end,
-                                       const Points& own) {
+                                       const Points& own, const std::set<CellPoints>& ghosts) {
   std::vector<std::uint8_t> ring(piece.body.cell_count(), 3);
   std::vector<std::uint8_t> others(ring.size());
   for (std::size_t c = 0; c < ring.size(); ++c) {
@@ -411,7 +421,9 @@ std::vector<std::uint8_t> rings_beside(const PieceBody& piece, std::uint32_t fir
   Points next;
   add_points(piece, ring, 1, next);
   for (std::size_t c = 0; c < ring.size(); ++c)
-    if (others[c] && ring[c] == 3 && has_one_of(piece, c, next)) ring[c] = 2;
+    if (others[c] && ring[c] == 3 &&
+        (has_one_of(piece, c, next) || ghosts.contains(points_of_cell(piece, c))))
+      ring[c] = 2;
   return ring;
 }
 
@@ -421,12 +433,16 @@ PiecesAround join_around(const PieceFiles& files, std::uint32_t first, std::uint
   Joiner joiner(files.list, std::nullopt);
   PiecesAround found;
   Points own;
+  std::set<CellPoints> ghosts;
   for (std::uint32_t index = first; index < end; ++index) {
     check_stop();
     PieceBody piece = read_piece(files, index);
     found.first_point = piece.numbers.first_point;
     std::vector<std::uint8_t> ring(piece.body.cell_count());
-    for (std::size_t c = 0; c < ring.size(); ++c) ring[c] = piece.ghost_cells[c] ? 3 : 0;
+    for (std::size_t c = 0; c < ring.size(); ++c) {
+      ring[c] = piece.ghost_cells[c] ? 3 : 0;
+      if (piece.ghost_cells[c]) ghosts.insert(points_of_cell(piece, c));
+    }
     add_points(piece, ring, 0, own);
     joiner.add_around(piece, files.files[index], ring);
   }
@@ -434,7 +450,7 @@ PiecesAround join_around(const PieceFiles& files, std::uint32_t first, std::uint
     if (index >= files.files.size()) continue;  // before the first, too
     check_stop();
     PieceBody piece = read_piece(files, index);
-    joiner.add_around(piece, files.files[index], rings_beside(piece, first, end, own));
+    joiner.add_around(piece, files.files[index], rings_beside(piece, first, end, own, ghosts));
   }
   found.body = joiner.take();
   joiner.take_rest(found);

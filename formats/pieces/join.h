@@ -23,8 +23,8 @@ struct PiecesAround {
   Body body;                         // in the order of every body
   std::vector<std::int64_t> point;   // (elements) number over all pieces
   std::vector<std::uint32_t> piece;  // (cells) whose own they are
-  std::vector<std::uint8_t>
-      ring;  // (cells) 0: of the pieces asked for; 1: shares an element with such a cell; 2: with one of those
+  // (cells) 0: of the pieces asked for; 1: shares an element with such a cell; 2: with one of those, or is a ghost of theirs all the same
+  std::vector<std::uint8_t> ring;
   std::vector<std::int64_t> first_point;  // PieceNumbers::first_point
 };
 

@@ -395,23 +395,43 @@ std::vector<double> thinnest_walls(const Body& body) {
   return thinnest;
 }
 
-// At cells of others' the values that they have. A cell is known by its first element.
-void exchange_at_cells(const Body& body, std::vector<Vec3>& values) {
-  std::vector<Vec3> at_elements(body.element_count(), Vec3::Zero());
-  for (std::uint32_t c = 0; c < body.cell_count(); ++c)
-    if (counts_cell(c)) at_elements[body.cell_elements[c][0]] += values[c];
-  other_pieces()->sum_at_elements(at_elements);
-  for (std::uint32_t c = 0; c < body.cell_count(); ++c)
-    if (!counts_cell(c)) values[c] = at_elements[body.cell_elements[c][0]];
+// (cells) A corner whose element no other cell of the voxel has: the first. Such cells lie one after another.
+std::vector<std::uint8_t> telling_corners(const Body& body) {
+  const auto voxel = [&](std::uint32_t c) { return body.lattice_index[body.cell_elements[c][0]]; };
+  std::vector<std::uint8_t> corner(body.cell_count(), 0);
+  for (std::uint32_t begin = 0, end = 0; begin < corner.size(); begin = end) {
+    while (end < corner.size() && voxel(end) == voxel(begin)) ++end;
+    for (std::uint32_t c = begin; c < end; ++c) {
+      const auto shared = [&](std::uint8_t a) {
+        std::size_t with = 0;
+        for (std::uint32_t other = begin; other < end; ++other)
+          with += body.cell_elements[other][a] == body.cell_elements[c][a];
+        return with > 1;
+      };
+      while (corner[c] < 7 && shared(corner[c])) ++corner[c];
+    }
+  }
+  return corner;
+}
+
+// At cells next to own ones the values that others have of them. `corner`: telling_corners().
+void exchange_at_cells(const Body& body, const std::vector<std::uint8_t>& corner, std::vector<Vec3>& values) {
+  for (std::uint8_t a = 0; a < 8; ++a) {
+    const bool here = std::find(corner.begin(), corner.end(), a) != corner.end();
+    if (!(over_pieces(here ? 1 : 0) > 0)) continue;
+    std::vector<Vec3> at_elements(body.element_count(), Vec3::Zero());
+    for (std::uint32_t c = 0; c < body.cell_count(); ++c)
+      if (corner[c] == a && counts_cell(c)) at_elements[body.cell_elements[c][a]] = values[c];
+    other_pieces()->sum_at_elements(at_elements);
+    for (std::uint32_t c = 0; c < body.cell_count(); ++c)
+      if (corner[c] == a && !counts_cell(c)) values[c] = at_elements[body.cell_elements[c][a]];
+  }
 }
 
 // (cells) As far as own ones go, of a body in pieces: a row may go on through several. No more than `most` is told apart.
 std::vector<double> thinnest_walls_over_pieces(const Body& body, double most) {
   const FacePairs pairs = face_pairs(body);
-  std::vector<std::uint8_t> used(body.element_count(), 0);
-  double twice = 0;
-  for (const auto& elements : body.cell_elements) twice += used[elements[0]]++;
-  if (over_pieces(twice) > 0) throw WholeBodyNeeded("two cells in one voxel share an element of it");
+  const std::vector<std::uint8_t> corner = telling_corners(body);
   std::vector<Vec3> after(body.cell_count()),
       before(body.cell_count());  // of the row, the cell with it, by axis
   for (std::size_t c = 0; c < after.size(); ++c) after[c] = before[c] = Vec3::Constant(body.fill[c]);
@@ -429,8 +449,8 @@ std::vector<double> thinnest_walls_over_pieces(const Body& body, double most) {
       for (auto pair = pairs[a].rbegin(); pair != pairs[a].rend(); ++pair)
         extend(after[(*pair)[0]], after[(*pair)[1]], (*pair)[0], axis);
     }
-    exchange_at_cells(body, after);
-    exchange_at_cells(body, before);
+    exchange_at_cells(body, corner, after);
+    exchange_at_cells(body, corner, before);
     changed = over_pieces(changed);
   }
   std::vector<double> thinnest(body.cell_count());

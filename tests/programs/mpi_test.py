@@ -204,14 +204,19 @@ tolerance = 1e-11
 
 
 def pieces_of(list_name, count):
-    """{place at rest: [(displacement, von Mises stress, place on the ghosts' side)]} of a result in pieces."""
+    """{element: [(displacement, von Mises stress), of it and of its ghosts]} of a result in pieces."""
     found = {}
     for p in range(count):
         piece = points(list_name.replace(".pvtu", f"_{p}.vtu"))
         stress = piece.point_data.get("von_mises", [0] * len(piece.points))
-        for at, moved, von_mises in zip(piece.point_data["rest"], piece.point_data["displacement"], stress):
-            found.setdefault(tuple(round(1e6 * x) for x in at), []).append((moved, von_mises))
+        for element, moved, von_mises in zip(elements(piece), piece.point_data["displacement"], stress):
+            found.setdefault(element, []).append((moved, von_mises))
     return found
+
+
+def elements(body_read):
+    """Where in the lattice each point is, and which of those there."""
+    return [(*map(int, at), int(piece)) for at, piece in zip(body_read.point_data["lattice_index"], body_read.point_data["piece"])]
 
 
 def same_on_pieces(ranks, pieces, text, part="bar.stl", size="2.5 mm", shared=True, stress=True):
@@ -227,10 +232,10 @@ def same_on_pieces(ranks, pieces, text, part="bar.stl", size="2.5 mm", shared=Tr
     expect(("puts the body together" not in told.err) == shared, f"shared: {shared}: {told.err}")
     one, every = points("one.vtu"), pieces_of("all.pvtu", pieces)
     scale, most = numpy.abs(one.point_data["displacement"]).max(), 0
-    expect(len(every) == len(one.points), f"{len(every)} places in pieces, {len(one.points)} in the whole")
+    expect(len(every) == len(one.points), f"{len(every)} elements in pieces, {len(one.points)} in the whole")
     loudest = one.point_data["von_mises"].max() if stress else 1
-    for n, at in enumerate(one.point_data["rest"]):
-        for moved, von_mises in every[tuple(round(1e6 * x) for x in at)]:
+    for n, at in enumerate(elements(one)):
+        for moved, von_mises in every[at]:
             most = max(most, numpy.abs(moved - one.point_data["displacement"][n]).max() / scale)
             if stress:
                 expect(abs(von_mises - one.point_data["von_mises"][n]) <= 1e-7 * loudest, f"stress at {at}: {von_mises} and {one.point_data['von_mises'][n]}")
