@@ -2,7 +2,9 @@
 #include "distributed/shared_solver.h"
 
 #include <exception>
+#include <optional>
 
+#include "base/error.h"
 #include "base/stop.h"
 #include "distributed/newton_snes.h"
 #include "distributed/refusals.h"
@@ -57,7 +59,7 @@ class SharedSolver : public simulate::CellsElsewhere {
         solved_->newton.solve(solved_->displacement, solved_->outer, solved_->prescribed, options,
                               rank() == 0 ? &progress : nullptr);
     state.displacement = body_.take(solved_->displacement);
-    check_stop();
+    stop_together();
     return outcome;
   }
 
@@ -96,6 +98,16 @@ class SharedSolver : public simulate::CellsElsewhere {
     NewtonSnes newton;
     Vector displacement, outer, prescribed, answer;
   };
+  // Throws on all ranks or on none: what follows a time limit, they write together.
+  void stop_together() {
+    int stop = rank() != 0 ? 0 : interrupted() ? 2 : stop_is_due() ? 1 : 0;
+    ok(MPI_Bcast(&stop, 1, MPI_INT, 0, PETSC_COMM_WORLD));
+    if (stop == 0) return;
+    stop_waits_.reset();
+    check_stop();  // rank 0
+    if (stop == 2) throw Interrupted();
+    throw TimeoutError("stopped with rank 0");
+  }
   void assemble_at_rest() {
     ok(VecZeroEntries(solved_->prescribed));
     solved_->system.assemble(solved_->prescribed, {}, nullptr, nullptr);
@@ -108,6 +120,7 @@ class SharedSolver : public simulate::CellsElsewhere {
   Mechanics& mechanics_;
   SharedBody& body_;
   std::unique_ptr<Solved> solved_;
+  std::optional<StopWaits> stop_waits_{std::in_place};  // rank 0 stops in stop_together() alone
 };
 
 }  // namespace
