@@ -373,6 +373,17 @@ def test_the_last_equilibrium_of_pieces_is_kept_in_pieces():
     expect_ok(run("flexel-map", "bent.failed.pvtu", "-o", "failed.stl"))
 
 
+def test_a_time_limit_ends_all_ranks_of_pieces():
+    """A rod that is pushed together to a fortieth of its length takes far longer; rank 0 alone has the limit, and all write what was reached."""
+    need_mpi()
+    box("bar.stl")
+    scene(text='material = "rubber"\n[[fix]]\nwhere = "xmin"\n[[move]]\nwhere = "xmax"\ndisplacement = ["-39 mm", "0 mm", "5 mm"]\n')
+    expect_ok(run("flexel-voxelize", "bar.stl", "--size", "2.5 mm", "--pieces", "2", "-o", "parts.pvtu"))
+    told = mpi(2, "scene.toml", "parts.pvtu", "-o", "bent.pvtu", "--no-estimate", "--timeout", "3 s")
+    expect_error(told, PROGRAM, "stopped by --timeout", "bent.failed.pvtu", code=5)
+    expect_ok(run("flexel-map", "bent.failed.pvtu", "-o", "reached.stl"))
+
+
 def test_options_of_petsc():
     need_mpi()
     scene(text=SMALL)
