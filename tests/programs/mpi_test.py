@@ -61,8 +61,9 @@ def need_mpi():
     need("mpirun")
 
 
-def mpi(ranks, *arguments, **options):
-    return run(*MPIRUN, ranks, BIN / PROGRAM, *arguments, env=ENVIRONMENT, **options)
+def mpi(ranks, *arguments, timeout=300, **options):
+    """Ranks wait for each other: on a crowded machine they take many times as long as alone."""
+    return run(*MPIRUN, ranks, BIN / PROGRAM, *arguments, env=ENVIRONMENT, timeout=timeout, **options)
 
 
 def points(path):
