@@ -463,6 +463,12 @@ void CellStiffness::mean_blocks(const CellKind& kind, const double* from, double
   }
 }
 
+const double* CellStiffness::tangent_of(std::uint32_t cell) const {
+  const std::size_t width = kLanes * step::kTangentColumns[static_cast<std::size_t>(form_)];
+  const std::uint32_t place = place_[cell];
+  return tangents_.data() + width * (place / kLanes) + place % kLanes;
+}
+
 void CellStiffness::cell_blocks(const Incidence& at, std::size_t begin, std::size_t end, Block* out) const {
   const PartKind& part = kinds_[part_[at.cell]];
   const double share = share_[at.cell];
@@ -470,9 +476,7 @@ void CellStiffness::cell_blocks(const Incidence& at, std::size_t begin, std::siz
     for (std::size_t b = begin; b < end; ++b) out[b] = share * part.at_rest[8 * at.corner + b];
     return;
   }
-  const std::size_t width = kLanes * step::kTangentColumns[static_cast<std::size_t>(form_)];
-  const std::uint32_t place = place_[at.cell];
-  const double* from = tangents_.data() + width * (place / kLanes) + place % kLanes;
+  const double* from = tangent_of(at.cell);
   mean_blocks(part.kind, from, share, at.corner, begin, end, out);
   add_hourglass_row(part.kind, hourglass_of(part.kind, from), share, at.corner, begin, end, out);
 }
@@ -554,9 +558,7 @@ Block CellStiffness::diagonal_of_cells(std::size_t element) const {
 
 // Of all eight corners, for less than two of them take one by one.
 void CellStiffness::deformed_diagonal(std::uint32_t cell, std::array<Block, 8>& out) const {
-  const std::size_t width = kLanes * step::kTangentColumns[static_cast<std::size_t>(form_)];
-  const std::uint32_t place = place_[cell];
-  const double* from = tangents_.data() + width * (place / kLanes) + place % kLanes;
+  const double* from = tangent_of(cell);
   const CellKind& kind = kinds_[part_[cell]].kind;
   for (std::size_t b = 0; b < 4; ++b) {
     mean_blocks(kind, from, share_[cell], b, b, b + 1, out.data());
@@ -567,7 +569,7 @@ void CellStiffness::deformed_diagonal(std::uint32_t cell, std::array<Block, 8>& 
 }
 
 // By the chunks of products_of_cells(), lattice frame.
-void CellStiffness::add_deformed_diagonals(std::vector<Block>& diagonal) const {
+void CellStiffness::set_deformed_diagonals(std::vector<Block>& diagonal) const {
   std::vector<Block> shared(layout_.shared.size());
   parallel_for_each(
       layout_.chunks.size(),
@@ -608,7 +610,7 @@ std::vector<Block> CellStiffness::diagonals_of_cells() const {
     parallel_for_each(rows(), [&](std::size_t e) { diagonal[e] = diagonal_of_cells(e); });
     return diagonal;
   }
-  add_deformed_diagonals(diagonal);
+  set_deformed_diagonals(diagonal);
   parallel_for_each(rows(), [&](std::size_t e) { turn(e, &diagonal[e], 1); });
   return diagonal;
 }

@@ -93,10 +93,12 @@ class CellStiffness final : public LinearOperator {
   // Blocks (a, b) of a cell for b in [begin, end), a its corner at the element, into out[b]; deformed ones in
   // the lattice's frame.
   void cell_blocks(const Incidence& at, std::size_t begin, std::size_t end, Block* out) const;
+  // The columns of a cell that is not at rest, kLanes apart.
+  [[nodiscard]] const double* tangent_of(std::uint32_t cell) const;
   void mean_blocks(const CellKind& kind, const double* from, double share, std::size_t a, std::size_t begin,
                    std::size_t end, Block* out) const;
   void deformed_diagonal(std::uint32_t cell, std::array<Block, 8>& out) const;
-  void add_deformed_diagonals(std::vector<Block>& diagonal) const;
+  void set_deformed_diagonals(std::vector<Block>& diagonal) const;
   [[nodiscard]] Block diagonal_of_cells(std::size_t element) const;
   [[nodiscard]] std::vector<Block> diagonals_of_cells() const;
   void add_others(std::size_t element, Block& own) const;
