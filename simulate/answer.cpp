@@ -12,11 +12,14 @@
 #include "simulate/mode_lines.h"
 #include "simulate/quadratic/local_stress.h"
 #include "simulate/scene/strength.h"
+#include "simulate/summary.h"
 
 namespace flexel::simulate {
 namespace {
 
 constexpr double kGuess = 0.5;  // a bar over this share of the value: hardly more than its size is known
+// A bar of that much bounds nothing: where a neck is narrower than a cell, each halving of the cells may double what moves.
+constexpr double kBoundless = 1;
 constexpr const char* kAxisNames[] = {"x", "y", "z"};
 constexpr std::size_t kNamed = 2;  // probes, supports: so many are named, the others counted
 
@@ -63,6 +66,9 @@ std::string moved(double length, const ErrorBar* bar, const SimulateResult& resu
   const bool unknown = result.error_bars.bars.empty() && !reason(result).empty();
   if (!share) return (unknown ? "no more than a first guess: " : "") + human_length(length);
   const double width = *share * length;
+  if (*share >= kBoundless)
+    return fmt::format("no more than a first guess: {}, could be several times as much",
+                       human_length(length));
   if (*share > kGuess)
     return fmt::format("no more than a first guess: {}, could be {}", human_length(length),
                        length_range(length - width, length + width));
@@ -155,6 +161,14 @@ std::string within(double share) {
   return text.starts_with("under") ? text : "within " + text;
 }
 
+// "; not counted: walls thinner than a cell (1.3 % of the places measured)"
+std::string not_counted(const std::vector<std::string>& unresolved) {
+  std::string text;
+  for (std::size_t n = 0; n < std::min(kNamed, unresolved.size()); ++n)
+    text += (n == 0 ? "; not counted: " : ", ") + unresolved[n];
+  return text + (unresolved.size() > kNamed ? fmt::format(", and {} more", unresolved.size() - kNamed) : "");
+}
+
 std::string how_sure(const SimulateResult& result, const Body& body) {
   if (result.timed) return "not known: runs in time have no error bars; compare with half the size";
   if (result.settled) return "not known: runs with contact have no error bars; compare with half the size";
@@ -166,12 +180,15 @@ std::string how_sure(const SimulateResult& result, const Body& body) {
                             : why == std::string::npos ? note
                                                        : note.substr(why + 8));
   }
-  const std::string cells = fmt::format("{} cells beside coarser ones", human_count(body.cell_count()));
+  const std::string cells = fmt::format("{} cells beside coarser ones", human_count(body.cell_count())),
+                    left_out = not_counted(unresolved(body));
   constexpr double kRounding = 1 + 1e-12;  // of bars that are 20 % of the value and no more
-  if (*worst <= 0.05) return fmt::format("well, {}: {}", within(*worst), cells);
-  if (*worst <= 0.2 * kRounding) return fmt::format("fairly, {}: {}", within(*worst), cells);
-  if (*worst <= kGuess) return fmt::format("roughly, {}{}", within(*worst), reason(result));
-  return fmt::format("hardly, off by up to {}{}", human_share(*worst), reason(result));
+  if (*worst <= 0.05) return fmt::format("well, {}: {}{}", within(*worst), cells, left_out);
+  if (*worst <= 0.2 * kRounding) return fmt::format("fairly, {}: {}{}", within(*worst), cells, left_out);
+  if (*worst <= kGuess) return fmt::format("roughly, {}{}{}", within(*worst), reason(result), left_out);
+  if (*worst < kBoundless)
+    return fmt::format("hardly, off by up to {}{}{}", human_share(*worst), reason(result), left_out);
+  return fmt::format("hardly, its error bar is larger than the value{}{}", reason(result), left_out);
 }
 
 const std::string& material_of(const Body& body, const std::string& part) {

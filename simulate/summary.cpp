@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 #include "base/error.h"
 #include "base/files/json.h"
 #include "base/human.h"
 #include "base/units.h"
 #include "base/version.h"
+#include "formats/lattice/column_names.h"
 #include "formats/pieces/other_pieces.h"
 #include "simulate/probes/report.h"
 #include "simulate/quadratic/local_stress.h"
@@ -381,6 +383,7 @@ std::string summary_json(const SimulateResult& result, const Body& body,
   json["elastic_energy"] = result.elastic_energy;
   if (!result.error_bars.bars.empty() || !result.error_bars.note.empty())
     json["error_bars"] = error_bars_json(result.error_bars);
+  if (const std::vector<std::string> lines = unresolved(body); !lines.empty()) json["unresolved"] = lines;
   json["smallest_jacobian"] = result.smallest_jacobian;
   if (result.smallest_corner_jacobian) {
     json["smallest_corner_jacobian"] = *result.smallest_corner_jacobian;
@@ -394,6 +397,15 @@ std::string summary_json(const SimulateResult& result, const Body& body,
   for (const EffectShare& effect : result.shares)
     json["time"].push_back({{"name", effect.name}, {"why", effect.why}, {"seconds", effect.seconds}});
   return json_text(json, 2) + "\n";
+}
+
+std::vector<std::string> unresolved(const Body& body) {
+  std::vector<std::string> lines;
+  const auto note = body.notes.find(kUnresolvedNote);
+  if (note == body.notes.end()) return lines;
+  std::istringstream text(note->second);
+  for (std::string line; std::getline(text, line);) lines.push_back(line);
+  return lines;
 }
 
 std::vector<std::string> summary_lines(const SimulateResult& result) {

@@ -15,6 +15,9 @@ namespace flexel::simulate {
                                        const std::vector<Material>& materials,
                                        const std::vector<std::string>& told = {});
 
+// What its lattice does not resolve, of the note that voxelizing left.
+[[nodiscard]] std::vector<std::string> unresolved(const Body& body);
+
 // The result in lines for people.
 [[nodiscard]] std::vector<std::string> summary_lines(const SimulateResult& result);
 

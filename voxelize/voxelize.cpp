@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "base/error.h"
+#include "base/files/append_text.h"
 #include "base/human.h"
 #include "base/nearest_word.h"
 #include "base/program/share_scope.h"
@@ -16,6 +17,7 @@
 #include "base/units.h"
 #include "formats/exchange/resolution.h"
 #include "formats/lattice/body_file.h"
+#include "formats/lattice/column_names.h"
 #include "formats/pieces/pieces.h"
 #include "voxelize/classify/assign_polygons.h"
 #include "voxelize/classify/axis_parity.h"
@@ -425,6 +427,22 @@ Made correct_count(Made made, double spacing, std::vector<HealedPart>& meshes,
   return made;
 }
 
+// What of the parts' shape the lattice does not have, a line each; cells with moments have walls of any thickness.
+std::string unresolved(const VoxelizeResult& result, bool with_moments) {
+  std::string lines;
+  for (std::size_t p = 0; p < result.parts.size(); ++p) {
+    const VoxelizedPart& part = result.parts[p];
+    const std::string of =
+        result.parts.size() == 1 ? "" : fmt::format(" of \"{}\"", result.body.parts[p].name);
+    if (part.lost_walls > 0 && !with_moments)
+      append_text(lines, "walls thinner than a cell{} ({} of the places measured)\n", of,
+                  human_share(static_cast<double>(part.lost_walls) / static_cast<double>(part.wall_samples)));
+    if (part.undecided_voxels > 0)
+      append_text(lines, "pieces in {}{} taken as one\n", counted(part.undecided_voxels, "voxel"), of);
+  }
+  return lines;
+}
+
 // Everything but the bodies of pieces. `meshes`: set to the parts, healed and on their lattices.
 Made make(Surface surface, const VoxelizeOptions& options, std::vector<HealedPart>& meshes,
           Progress& progress) {
@@ -460,6 +478,8 @@ Made make(Surface surface, const VoxelizeOptions& options, std::vector<HealedPar
   result.pairs = noteworthy_pairs(meshes, cell);
   refuse_duplicates(result.pairs, result.body.surface);
   result.with_moments = options.moments;
+  if (const std::string lines = unresolved(result, options.moments); !lines.empty())
+    result.body.notes[kUnresolvedNote] = lines;
   result.simulation_memory = simulation_memory(cells, options.placement, options.moments);
   return made;
 }
@@ -526,6 +546,7 @@ VoxelizeResult voxelize_pieces(Surface surface, const VoxelizeOptions& options, 
     PieceBody piece = slabs.make(index, spread);
     for (std::size_t p = 0; p < spread.size(); ++p) result.parts[p].spread_cells += spread[p];
     piece.numbers.run = run;
+    piece.body.notes.insert(result.body.notes.begin(), result.body.notes.end());
     use(result.body, piece);
   }
   progress.finish();

@@ -33,14 +33,14 @@ def box(path, sides):
     path.write_text("".join(f"v {a} {b} {c}\n" for a, b, c in corners) + "".join("f " + " ".join(str(i + 1) for i in quad) + "\n" for quad in quads))
 
 
-def bar(folder, sides, pieces=0):
-    """A bar of so many cells along x, y and z; in pieces, a list of them."""
+def bar(folder, sides, pieces=0, force=100):
+    """A bar of so many cells along x, y and z; in pieces, a list of them. The load is so many newtons."""
     body = folder / (f"bar-{sides[0]}-{sides[1]}-{pieces}.pvtu" if pieces else f"bar-{sides[0]}-{sides[1]}.vtu")
     if not body.exists():
         box(folder / "bar.obj", sides)
         subprocess.run(["flexel-voxelize", folder / "bar.obj", "--size", "1 mm", "--quiet", "-o", body, *(["--pieces", str(pieces)] if pieces else [])], check=True,
                        stderr=subprocess.DEVNULL)
-    (folder / "scene.toml").write_text(SCENE)
+    (folder / "scene.toml").write_text(SCENE.replace("-100 N", f"-{force} N"))
     return body
 
 
@@ -140,19 +140,34 @@ def memory_table(folder, cases):
     return results
 
 
-def pieces_table(folder, cases):
-    print("\n## Memory of a body in pieces\n\nAs many pieces as ranks (`.pvtu`): no rank has the whole ([guide/mpi.md](../guide/mpi.md#where-no-rank-has-the-whole)). Each has its own "
-          "cells, their elements and two layers of cells beside them, besides what is made of its cells. Base and share as above, one rank being that of one file.\n")
-    head("cells", "ranks", "base MB", "MB of rank 0", "MB of the largest other", "share")
+def pieces_table(folder, cases, force=100):
+    """Rows of the memory of a body in pieces beside that of one file on one rank."""
     results = []
     for sides in cases:
-        alone = solve(folder, bar(folder, sides), 1)["memory"][0] - solve(folder, bar(folder, (16, 1, 1)), 1)["memory"][0]
+        alone = solve(folder, bar(folder, sides, 0, force), 1)["memory"][0] - solve(folder, bar(folder, (16, 1, 1)), 1)["memory"][0]
+        bar(folder, sides).unlink()
         for ranks in RANKS[1:]:
             base = max(solve(folder, bar(folder, (16, 1, 1), ranks), ranks)["memory"])
-            found = solve(folder, bar(folder, sides, ranks), ranks)
+            found = solve(folder, bar(folder, sides, ranks, force), ranks)
             results.append((sides, found))
             row(f"{found['cells']:,}", ranks, f"{base / 1e6:,.0f}", *memory_words(found), f"{(max(found['memory']) - base) * ranks / alone:.2f}")
     return results
+
+
+def pieces_head():
+    print("\n## Memory of a body in pieces\n\nAs many pieces as ranks (`.pvtu`): no rank has the whole ([guide/mpi.md](../guide/mpi.md#where-no-rank-has-the-whole)). Each has its own "
+          "cells, their elements and two layers of cells beside them, besides what is made of its cells. Base and share as above, one rank being that of one file.\n")
+    head("cells", "ranks", "base MB", "MB of rank 0", "MB of the largest other", "share")
+
+
+def huge_tables(folder):
+    """What takes 20 GB and half an hour."""
+    print("\nFour million cells, 400 x 100 x 100:\n")
+    head("cells", "ranks", "base MB", "MB of rank 0", "MB of the largest other", "share")
+    pieces_table(folder, [(400, 100, 100)])
+    print("\nA thin part, a plate of 400 x 200 x 2 cells under a hundredth of a newton:\n")
+    head("cells", "ranks", "base MB", "MB of rank 0", "MB of the largest other", "share")
+    pieces_table(folder, [(400, 200, 2)], 0.01)
 
 
 def scaling_table(folder, title, words, cases):
@@ -257,10 +272,13 @@ def main():
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("--large", action="store_true", help="a million cells too")
     arguments.add_argument("--last", action="store_true", help="only the sections after the first on memory")
+    arguments.add_argument("--huge", action="store_true", help="nothing but the memory of four million cells in pieces, and of a thin part (20 GB)")
     arguments.add_argument("--ex56", type=pathlib.Path, help="source of PETSc's example ksp/tutorials/ex56.c (Debian's libpetsc3.18-dev-examples has it)")
     options = arguments.parse_args()
     with tempfile.TemporaryDirectory() as place:
         folder = pathlib.Path(place)
+        if options.huge:
+            return huge_tables(folder)
         print(f"""# Many processes
 
 Printed by `bench/scale/scale.py{' --large' if options.large else ''}` on {os.cpu_count()} cores ({processor_name()}), load average {os.getloadavg()[0]:.1f} when it began. A bar of steel, 4:1:1, held at one end, with a small
@@ -270,6 +288,7 @@ share them.""")
         if not options.last:
             hierarchy_table(folder, [(56, 14, 14), (116, 29, 29)] + ([(252, 63, 63)] if options.large else []))
             large = memory_table(folder, [(56, 14, 14), (116, 29, 29), (168, 42, 42)])
+        pieces_head()
         in_pieces = pieces_table(folder, [(56, 14, 14), (116, 29, 29)])
         results = scaling_table(folder, "Strong scaling", "The same body on more ranks.", [((88, 22, 22), ranks) for ranks in (1, 2, 4)])
         results += scaling_table(folder, "Weak scaling", "As many cells for each rank: the bar grows along its length.",

@@ -1,5 +1,5 @@
-// Names of columns of a body that more than one stage knows (docs/reference/body-file.md): changes of what it is made of, and the
-// stresses that a run found.
+// Names of columns and notes of a body that more than one stage knows (docs/reference/body-file.md): changes of what it is
+// made of, the stresses that a run found, and what its lattice does not resolve.
 #pragma once
 #include <array>
 
@@ -40,6 +40,10 @@ constexpr const char* kVonMisesColumn = "von_mises";          // Pa
 constexpr const char* kPrincipalColumn = "principal_stress";  // Pa, 3, descending
 constexpr const char* kYieldColumn =
     "yield_share";  // of the material's `yield`; -1 where it has none. Vertices only
+
+// Note: what of a part's shape its lattice does not have, a line each. No error bar counts it, for coarser lattices have it
+// no more.
+constexpr const char* kUnresolvedNote = "unresolved";
 
 // Whether a run (of model `quadratic`) left stresses at the surface's vertices: then columns of these names there are not the
 // part's own.
