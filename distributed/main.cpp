@@ -174,15 +174,16 @@ void end_with(const Told& told, const Arguments& arguments, Progress& progress) 
 bool may_share(const Arguments& arguments, const std::optional<PieceFiles>& pieces) {
   const SimulateOptions& options = arguments.options;
   const auto ranks = static_cast<std::size_t>(distributed::ranks());
-  return pieces && ranks > 1 && pieces->files.size() % ranks == 0 && !options.estimate &&
-         options.checkpoint.empty() && arguments.resume.empty();
+  return pieces && ranks > 1 && pieces->files.size() % ranks == 0 && options.checkpoint.empty() &&
+         arguments.resume.empty();
 }
 
 // Where no rank has the whole body; false: one has to.
 bool lead_shared(const Arguments& arguments, const PieceFiles& pieces, const Scene& scene,
-                 const distributed::Leader& leader, const KeptWarnings& warnings, Progress& progress) {
+                 distributed::Leader& leader, const KeptWarnings& warnings, Progress& progress) {
   distributed::SharedRequest request{pieces, arguments.output, failed_list(arguments), arguments.summary};
   request.stress = arguments.options.stress;
+  request.estimate = arguments.options.estimate;
   request.compress = arguments.compress;
   request.threads = arguments.options.threads;
   Told told;

@@ -5,6 +5,7 @@
 #include <exception>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "base/error.h"
 #include "formats/lattice/fields.h"
@@ -61,7 +62,7 @@ void all_or_none(const std::function<void()>& own) {
   throw InputError(all.where, all.what);
 }
 
-SharedBody::SharedBody(const PieceFiles& files) {
+SharedBody::SharedBody(const PieceFiles& files, LetFirst let_first) : let_first_(std::move(let_first)) {
   const auto each = static_cast<std::uint32_t>(files.files.size()) / static_cast<std::uint32_t>(ranks());
   first_ = each * static_cast<std::uint32_t>(rank());
   end_ = first_ + each;
@@ -319,6 +320,22 @@ std::uint32_t SharedBody::join_sets(std::vector<std::uint32_t>& set) {
     if (each != kNoSet)
       each = static_cast<std::uint32_t>(std::lower_bound(all.begin(), all.end(), lowest[each]) - all.begin());
   return static_cast<std::uint32_t>(all.size());
+}
+
+std::vector<Bytes> SharedBody::gather(Bytes own) {
+  std::vector<Bytes> all;
+  if (rank() != 0) {
+    send(0, own);
+    return all;
+  }
+  all.push_back(std::move(own));
+  for (int from = 1; from < ranks(); ++from) all.push_back(receive(from));
+  return all;
+}
+
+void SharedBody::let_first(const std::function<void()>& work) {
+  const WithoutOtherPieces whole;
+  let_first_(work);
 }
 
 Vec3 SharedBody::rest_of_corner(std::uint32_t cell, std::uint32_t corner) {

@@ -15,11 +15,14 @@ namespace flexel::distributed {
 // Calls `own` on every rank. Where it throws InputError or std::bad_alloc on some, all throw, what the first of them told.
 void all_or_none(const std::function<void()>& own);
 
+// Rank 0 does `work`, and the others what it orders, until that is done. Of all ranks together.
+using LetFirst = std::function<void(const std::function<void()>& work)>;
+
 class SharedBody : public OtherPieces {
  public:
   // As many pieces for each rank: their number is a multiple of ranks(). Throws InputError as join_pieces does, and WholeBodyNeeded
   // for a body that is not one part in one piece of matter, or has been in a run that broke or cut it.
-  explicit SharedBody(const PieceFiles& files);
+  SharedBody(const PieceFiles& files, LetFirst let_first);
   ~SharedBody() override;
   SharedBody(const SharedBody&) = delete;
   SharedBody& operator=(const SharedBody&) = delete;
@@ -48,7 +51,10 @@ class SharedBody : public OtherPieces {
   void take_from_owners(std::span<double> values, std::size_t width) override;
   std::uint32_t join_sets(std::vector<std::uint32_t>& set) override;
   Vec3 rest_of_corner(std::uint32_t cell, std::uint32_t corner) override;
+  std::vector<Bytes> gather(Bytes own) override;
+  void let_first(const std::function<void()>& work) override;
   [[nodiscard]] bool is_first() const override { return rank() == 0; }
+  [[nodiscard]] std::int64_t number_of(std::uint32_t element) const override { return number_[element]; }
   [[nodiscard]] bool owns_element(std::uint32_t element) const override { return owns_[element] != 0; }
   [[nodiscard]] bool owns_cell(std::uint32_t cell) const override { return around_.ring[cell] == 0; }
   [[nodiscard]] const std::vector<std::uint8_t>& polygons_with_cells() const override { return with_cells_; }
@@ -66,6 +72,7 @@ class SharedBody : public OtherPieces {
   void refuse_fragments();
   void refuse_far_surface();
 
+  LetFirst let_first_;
   std::uint32_t first_ = 0, end_ = 0;  // pieces
   PiecesAround around_;
   std::vector<std::uint8_t> owns_, with_cells_, own_vertices_;  // (elements), (polygons), (vertices)

@@ -46,6 +46,7 @@ void write_result(const SharedRequest& request, SharedBody& shared, const std::s
 Body body_to_tell_of(const SharedBody& shared, const Body& own, const SimulateResult& result) {
   Body told;
   told.parts = own.parts;
+  told.notes = own.notes;
   Part& part = told.parts.front();
   part.element_begin = part.cell_begin = 0;
   part.element_end = 3;
@@ -53,6 +54,8 @@ Body body_to_tell_of(const SharedBody& shared, const Body& own, const SimulateRe
   const Vec3 at = result.stress ? result.stress->at : shared.box().min;
   told.rest = told.position = {shared.box().min, shared.box().max, at};
   told.cell_elements.resize(1);
+  told.fill = {1};
+  told.broken = {0};
   if (result.stress) told.element_columns["von_mises"] = {1, {0, 0, result.stress->value}};
   return told;
 }
@@ -60,20 +63,22 @@ Body body_to_tell_of(const SharedBody& shared, const Body& own, const SimulateRe
 }  // namespace
 
 std::size_t run_on_pieces(const SharedRequest& request, const Scene& scene, const SimulateOptions& options,
-                          Progress& progress, const TellResult& tell) {
-  SharedBody shared(request.files);
+                          const WholeBodies& whole, Progress& progress, const TellResult& tell) {
+  SharedBody shared(request.files, whole.let_first);
   const WithOtherPieces others(shared);
   Body& body = shared.body();
   refuse_unsupported(scene, body);
   if (request.stress) (void)simulate::share_of_thin_walls(body, 2);  // else too late where it cannot tell
   SimulateOptions own = options;
   LoadStepHooks hooks;
-  hooks.make_solver = [&](Mechanics& mechanics) { return make_shared_solver(mechanics, shared, scene); };
+  hooks.make_solver = [&](Mechanics& mechanics) {
+    return other_pieces() ? make_shared_solver(mechanics, shared, scene) : whole.make_solver(mechanics);
+  };
   hooks.save = [&](Body&, const std::string& list) { write_result(request, shared, list); };
   own.hooks = std::make_shared<const LoadStepHooks>(std::move(hooks));
   own.stress = request.stress;
   own.threads = request.threads;
-  own.estimate = false;
+  own.estimate = request.estimate;
   own.failed_output = request.failed;
   const SimulateResult result = simulate::simulate(body, scene, own, progress);
   own.hooks.reset();

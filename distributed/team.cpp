@@ -30,7 +30,19 @@ using simulate::NewtonProgress;
 using simulate::Scene;
 using simulate::State;
 
-enum class Order : std::uint8_t { threads, scene, share, begin, solve, of_state, multiply, drop, uses, end };
+enum class Order : std::uint8_t {
+  threads,
+  scene,
+  share,
+  begin,
+  solve,
+  of_state,
+  multiply,
+  drop,
+  back,
+  uses,
+  end
+};
 // Of a state, or of the tangent.
 enum class Question : std::uint8_t { figures, forces, stable, diagonal };
 
@@ -61,6 +73,15 @@ class AtWork {
   int entered_ = std::uncaught_exceptions();
 };
 
+// Of rank 0, while the others wait for its orders.
+class AtRest {
+ public:
+  AtRest() { at_work = false; }
+  ~AtRest() { at_work = true; }
+  AtRest(const AtRest&) = delete;
+  AtRest& operator=(const AtRest&) = delete;
+};
+
 void order(Order what, const Bytes& more = {}) {
   Bytes bytes{static_cast<std::byte>(what)};
   bytes.insert(bytes.end(), more.begin(), more.end());
@@ -70,7 +91,7 @@ void order(Order what, const Bytes& more = {}) {
 template <class Archive>
 void visit_request(Archive& archive, SharedRequest& request) {
   visit_all(archive, request.files.list, request.files.run, request.files.files, request.output,
-            request.failed, request.stress, request.compress, request.threads);
+            request.failed, request.stress, request.estimate, request.compress, request.threads);
 }
 
 Bytes bytes_of(NewtonOptions& options) {
@@ -323,8 +344,18 @@ class Follower {
         return members_.pop_back();
       case Order::uses:
         return (void)gather_uses();
+      case Order::back:
       case Order::end:
         return;
+    }
+  }
+  // Obeys until this order, of which what it says is returned.
+  Bytes obey_until(Order last) {
+    for (;;) {
+      Bytes bytes;
+      broadcast(bytes);
+      if (static_cast<Order>(bytes[0]) == last) return {bytes.begin() + 1, bytes.end()};
+      obey(static_cast<Order>(bytes[0]), std::span(bytes).subspan(1));
     }
   }
   // Freeing what all ranks share would wait for them.
@@ -347,7 +378,8 @@ class Follower {
     visit_request(unpacker, request);
     Progress silent("", Progress::Mode::silent);
     try {
-      most_cells = static_cast<double>(run_on_pieces(request, scene_, {}, silent, {}));
+      const WholeBodies whole{{}, [this](const auto&) { (void)obey_until(Order::back); }};
+      most_cells = static_cast<double>(run_on_pieces(request, scene_, {}, whole, silent, {}));
     } catch (const WholeBodyNeeded&) {
     }
   }
@@ -375,14 +407,20 @@ void Leader::give(const Scene& scene) {
 }
 
 std::string Leader::run(const SharedRequest& request, const simulate::SimulateOptions& options,
-                        Progress& progress, const TellResult& tell) const {
+                        Progress& progress, const TellResult& tell) {
   const AtWork together;
   Packer packer;
   SharedRequest said = request;
   visit_request(packer, said);
   order(Order::share, packer.bytes);
   try {
-    most_cells = static_cast<double>(run_on_pieces(request, *scene_, options, progress, tell));
+    const WholeBodies whole{[this](Mechanics& mechanics) { return make_solver(mechanics); },
+                            [](const std::function<void()>& work) {
+                              const AtRest resting;
+                              work();
+                              order(Order::back);
+                            }};
+    most_cells = static_cast<double>(run_on_pieces(request, *scene_, options, whole, progress, tell));
   } catch (const WholeBodyNeeded& needed) {
     return needed.what();
   }
@@ -416,13 +454,7 @@ int follow() {
   const AtWork together;
   Follower follower;
   try {
-    for (;;) {
-      Bytes bytes;
-      broadcast(bytes);
-      const std::span<const std::byte> more = std::span(bytes).subspan(1);
-      if (static_cast<Order>(bytes[0]) == Order::end) return read_message<int>(more);
-      follower.obey(static_cast<Order>(bytes[0]), more);
-    }
+    return read_message<int>(follower.obey_until(Order::end));
   } catch (...) {
     // Where rank 0 failed likewise it says so and ends all.
     std::this_thread::sleep_for(std::chrono::seconds(2));

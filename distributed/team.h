@@ -31,7 +31,7 @@ class Leader {
   void give(const simulate::Scene& scene);
   // run_on_pieces() on all ranks. Returned is why it takes the whole body, "" where it was done without.
   [[nodiscard]] std::string run(const SharedRequest& request, const simulate::SimulateOptions& options,
-                                Progress& progress, const TellResult& tell) const;
+                                Progress& progress, const TellResult& tell);
   // What each rank has taken so far.
   [[nodiscard]] std::vector<RankUse> uses() const;
   // The others end with this exit code, unless they are at work: then Session::abort() is left.

@@ -180,7 +180,10 @@ std::string how_sure(const SimulateResult& result, const Body& body) {
                             : why == std::string::npos ? note
                                                        : note.substr(why + 8));
   }
-  const std::string cells = fmt::format("{} cells beside coarser ones", human_count(body.cell_count())),
+  const std::string cells = fmt::format(
+                        "{} cells beside coarser ones",
+                        human_count(result.error_bars.cells.empty() ? body.cell_count()
+                                                                    : result.error_bars.cells[0])),
                     left_out = not_counted(unresolved(body));
   constexpr double kRounding = 1 + 1e-12;  // of bars that are 20 % of the value and no more
   if (*worst <= 0.05) return fmt::format("well, {}: {}{}", within(*worst), cells, left_out);
@@ -312,7 +315,7 @@ std::string usual_next(const SimulateResult& result, const Body& body, const std
     return "--verbose says all that was found, --summary FILE as JSON";
   const double spacing = std::cbrt(body.parts.front().lattice.spacing.prod());
   const bool walls = !worst && !reason(result).empty();
-  const double finer = walls ? refinement_for_walls(body) : 2;  // else there might be no bar again
+  const double finer = walls ? result.error_bars.refinement : 2;  // else there might be no bar again
   return fmt::format("{} {}mm{}", size_option, size_digits(1e3 * spacing / finer),
                      worst            ? " makes this surer"
                      : result.settled ? ": compare with it"

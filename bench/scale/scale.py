@@ -233,8 +233,8 @@ def billion(results, in_pieces):
 | bytes a tangent and rank | {2 * 72 * side * side / 1e6:.1f} MB | a block of 72 bytes an element of those faces |
 | processor seconds a rank | {least * each * iterations:,.0f} s | {least * 1e6:.1f} us a cell and CG iteration, all of the run on one rank above, and {iterations} iterations, the most above |
 
-So the body has to come in pieces: where rank 0 holds the whole, a machine of 1 TB ends near {1e12 / max(whole, 1) / 1e9:.1f} billion cells. What error bars need of coarser lattices is not
-in this: with them rank 0 holds the whole. Each rank has the whole surface, of which the bar has 12 triangles. Slabs of a bar 4:1:1 cut in 1,000 are {4 * side / 1000:.1f} cells
+So the body has to come in pieces: where rank 0 holds the whole, a machine of 1 TB ends near {1e12 / max(whole, 1) / 1e9:.1f} billion cells. For error bars rank 0 holds the lattice twice as
+coarse besides, an eighth of the cells, which is not in this. Each rank has the whole surface, of which the bar has 12 triangles. Slabs of a bar 4:1:1 cut in 1,000 are {4 * side / 1000:.1f} cells
 thick, with as many elements on their faces as within: so many ranks want another cut. And PETSc as Debian builds it counts unknowns in 32 bits, which end at 2.1e9 (3e9 are needed):
 `libpetsc64-real-dev` has 64.""")
 

@@ -29,6 +29,12 @@ WithOtherPieces::~WithOtherPieces() {
   present = nullptr;
 }
 
+WithoutOtherPieces::WithoutOtherPieces() : before_(std::exchange(present, nullptr)) {}
+
+WithoutOtherPieces::~WithoutOtherPieces() {
+  present = before_;
+}
+
 double over_pieces(double own) {
   if (present) present->sum(std::span(&own, 1));
   return own;

@@ -6,11 +6,13 @@
 // Everything here but what only reads is called by all processes together.
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "base/files/files.h"
 #include "formats/lattice/body.h"
 #include "formats/lattice/locate.h"
 
@@ -39,7 +41,13 @@ class OtherPieces {
   // m: where an element of the cell of a number over all pieces rests.
   virtual Vec3 rest_of_corner(std::uint32_t cell, std::uint32_t corner) = 0;
 
-  [[nodiscard]] virtual bool is_first() const = 0;  // of all processes
+  // On the first process what each gives, in their order; elsewhere nothing.
+  [[nodiscard]] virtual std::vector<Bytes> gather(Bytes own) = 0;
+  // The first process does `work`, as one that holds a whole body of its own; the others help where it solves.
+  virtual void let_first(const std::function<void()>& work) = 0;
+
+  [[nodiscard]] virtual bool is_first() const = 0;                                // of all processes
+  [[nodiscard]] virtual std::int64_t number_of(std::uint32_t element) const = 0;  // over all pieces
   [[nodiscard]] virtual bool owns_element(std::uint32_t element) const = 0;
   [[nodiscard]] virtual bool owns_cell(std::uint32_t cell) const = 0;
   [[nodiscard]] virtual const std::vector<std::uint8_t>& polygons_with_cells()
@@ -61,6 +69,18 @@ class WithOtherPieces {
   ~WithOtherPieces();
   WithOtherPieces(const WithOtherPieces&) = delete;
   WithOtherPieces& operator=(const WithOtherPieces&) = delete;
+};
+
+// While one lives, other_pieces() is null.
+class WithoutOtherPieces {
+ public:
+  WithoutOtherPieces();
+  ~WithoutOtherPieces();
+  WithoutOtherPieces(const WithoutOtherPieces&) = delete;
+  WithoutOtherPieces& operator=(const WithoutOtherPieces&) = delete;
+
+ private:
+  OtherPieces* before_;
 };
 
 // Sums over the pieces; the value itself where there is one.

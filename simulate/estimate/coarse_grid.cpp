@@ -6,9 +6,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "base/error.h"
+#include "formats/pieces/other_pieces.h"
 
 namespace flexel::simulate {
 namespace {
@@ -32,6 +34,13 @@ bool holds(const CoarseGrid& grid, double plane) {
   return std::abs(at - std::round(at)) * grid.pitch < kOnPlane;
 }
 
+// The largest over the pieces of a body.
+std::int32_t largest_over_pieces(std::int32_t own) {
+  double value = own;
+  if (other_pieces()) (void)other_pieces()->take_of_largest(value, std::span(&value, 1));
+  return static_cast<std::int32_t>(value);
+}
+
 // Area of the flat faces by plane of the lattice, in faces of cells: full cells with no neighbour there.
 struct FlatFaces {
   std::int32_t begin = 0;
@@ -45,19 +54,23 @@ FlatFaces flat_faces(const Body& body, const Part& part, const FacePairs& pairs,
     if (low >= part.cell_begin && low < part.cell_end)
       covered[low - part.cell_begin][1] = covered[high - part.cell_begin][0] = 1;
   const auto index = [&](std::uint32_t c) { return body.lattice_index[body.cell_elements[c][0]][axis]; };
-  std::int32_t low = index(part.cell_begin), high = low;
+  std::int32_t low = std::numeric_limits<std::int32_t>::max(),
+               high = std::numeric_limits<std::int32_t>::lowest();
   for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c) {
     low = std::min(low, index(c));
     high = std::max(high, index(c));
   }
+  low = -largest_over_pieces(-low);
+  high = largest_over_pieces(high);
   result.begin = low;
   result.area.assign(static_cast<std::size_t>(high - low) + 2, 0);
   for (std::uint32_t c = part.cell_begin; c < part.cell_end; ++c) {
-    if (body.broken[c] || body.fill[c] < 1 - 1e-6) continue;
+    if (body.broken[c] || body.fill[c] < 1 - 1e-6 || !counts_cell(c)) continue;
     for (std::size_t side = 0; side < 2; ++side)
       if (!covered[c - part.cell_begin][side])
         result.area[static_cast<std::size_t>(index(c) - low) + side] += 1;
   }
+  if (other_pieces()) other_pieces()->sum(result.area);
   return result;
 }
 
@@ -147,11 +160,11 @@ GridCut cut(const CoarseGrid& grid, std::int32_t index) {
 std::array<CoarseGrid, 3> choose_grids(const Body& body, const Part& part, const FacePairs& pairs) {
   std::array<FlatFaces, 3> faces;
   std::array<CoarseGrid, 3> grids;
+  const bool with_moments = over_pieces(body.moment_cells.empty() ? 0 : 1) > 0;
   std::size_t thinnest = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     faces[axis] = flat_faces(body, part, pairs, axis);
-    grids[axis] =
-        body.moment_cells.empty() ? choose_grid(faces[axis], kDoubled, part.name) : doubled_grid(faces[axis]);
+    grids[axis] = with_moments ? doubled_grid(faces[axis]) : choose_grid(faces[axis], kDoubled, part.name);
     if (faces[axis].area.size() < faces[thinnest].area.size()) thinnest = axis;
   }
   // Cells of another shape have another error: where the part is thin and must stay finer, all axes do.

@@ -24,7 +24,7 @@ struct GridCut {
 };
 [[nodiscard]] GridCut cut(const CoarseGrid& grid, std::int32_t index);
 
-// By axis, moved so that the first coarse plane at or below all cells has index 0. The pitch is 2 unless
+// By axis, of the whole body where it is in pieces, moved so that the first coarse plane at or below all cells has index 0. The pitch is 2 unless
 // another from 1.5 to 3 puts more flat faces of the part on planes; where the axis along which the part is
 // thinnest takes less, the others come near to that. Throws InputError: a part one cell thick. A body with moments
 // gets a pitch of 2 from a plane of its own everywhere: no cell is cut, for what of its moments lies on either side

@@ -30,11 +30,9 @@ namespace {
 // One part on its coarse lattice.
 class PartCoarsening {
  public:
-  PartCoarsening(const Body& fine, std::size_t part, const FacePairs& pairs)
-      : fine_(fine),
-        part_(fine.parts[part]),
-        grids_(choose_grids(fine, part_, pairs)),
-        offset_(part_.cell_end - part_.cell_begin + 1, 0) {
+  PartCoarsening(const Body& fine, const Part& part, const FacePairs& pairs,
+                 const std::array<CoarseGrid, 3>& grids)
+      : fine_(fine), part_(part), grids_(grids), offset_(part_.cell_end - part_.cell_begin + 1, 0) {
     cut_cells();
     boxes_ = DisjointSets(offset_.back());
     for (std::size_t axis = 0; axis < 3; ++axis) join_boxes(axis, pairs[axis], false);
@@ -260,7 +258,46 @@ void PartCoarsening::append_moments(Body& coarse) const {
   }
 }
 
-void refuse(const Body& body) {
+// `grids`: of the only part; null: chosen.
+Coarsening coarsen(const Body& body, const std::array<CoarseGrid, 3>* grids) {
+  const FacePairs pairs = face_pairs(body);
+  const bool with_moments = has_all_moments(body);
+  Coarsening result{{}, {0}, {}};
+  Body& coarse = result.body;
+  for (const Part& each : body.parts) {
+    PartCoarsening part(body, each, pairs, grids ? *grids : choose_grids(body, each, pairs));
+    part.append_to(coarse);
+    if (with_moments) part.append_moments(coarse);
+    for (std::uint32_t c = each.cell_begin; c < each.cell_end; ++c) {
+      part.cells_of(c, result.cells);
+      result.offsets.push_back(static_cast<std::uint32_t>(result.cells.size()));
+    }
+  }
+  coarse.position = coarse.rest;
+  coarse.broken.assign(coarse.cell_count(), 0);
+  coarse.surface = without_bytes(body.surface);
+  std::vector<std::uint32_t> under;
+  for (std::size_t p = 0; p + 1 < body.surface_cell_offsets.size(); ++p) {
+    coarse.surface_cell_offsets.push_back(static_cast<std::uint32_t>(coarse.surface_cells.size()));
+    under.clear();
+    for (std::uint32_t at = body.surface_cell_offsets[p]; at < body.surface_cell_offsets[p + 1]; ++at) {
+      const std::uint32_t cell = body.surface_cells[at];
+      under.insert(under.end(), result.cells.begin() + result.offsets[cell],
+                   result.cells.begin() + result.offsets[cell + 1]);
+    }
+    std::sort(under.begin(), under.end());
+    under.erase(std::unique(under.begin(), under.end()), under.end());
+    coarse.surface_cells.insert(coarse.surface_cells.end(), under.begin(), under.end());
+  }
+  if (!body.surface_cell_offsets.empty())
+    coarse.surface_cell_offsets.push_back(static_cast<std::uint32_t>(coarse.surface_cells.size()));
+  derive_connections(coarse);
+  return result;
+}
+
+}  // namespace
+
+void refuse_to_coarsen(const Body& body) {
   for (const Columns* columns : {&body.cell_columns, &body.element_columns})
     for (const auto& [name, column] : *columns)
       if (!is_stress_column(name) && name != "velocity" && name != kQuadraticColumn &&
@@ -287,43 +324,13 @@ Surface without_bytes(const Surface& surface) {
   return copy;
 }
 
-}  // namespace
-
 Coarsening coarsening(const Body& body) {
-  refuse(body);
-  const FacePairs pairs = face_pairs(body);
-  const bool with_moments = has_all_moments(body);
-  Coarsening result{{}, {0}, {}};
-  Body& coarse = result.body;
-  for (std::size_t p = 0; p < body.parts.size(); ++p) {
-    PartCoarsening part(body, p, pairs);
-    part.append_to(coarse);
-    if (with_moments) part.append_moments(coarse);
-    for (std::uint32_t c = body.parts[p].cell_begin; c < body.parts[p].cell_end; ++c) {
-      part.cells_of(c, result.cells);
-      result.offsets.push_back(static_cast<std::uint32_t>(result.cells.size()));
-    }
-  }
-  coarse.position = coarse.rest;
-  coarse.broken.assign(coarse.cell_count(), 0);
-  coarse.surface = without_bytes(body.surface);
-  std::vector<std::uint32_t> under;
-  for (std::size_t p = 0; p + 1 < body.surface_cell_offsets.size(); ++p) {
-    coarse.surface_cell_offsets.push_back(static_cast<std::uint32_t>(coarse.surface_cells.size()));
-    under.clear();
-    for (std::uint32_t at = body.surface_cell_offsets[p]; at < body.surface_cell_offsets[p + 1]; ++at) {
-      const std::uint32_t cell = body.surface_cells[at];
-      under.insert(under.end(), result.cells.begin() + result.offsets[cell],
-                   result.cells.begin() + result.offsets[cell + 1]);
-    }
-    std::sort(under.begin(), under.end());
-    under.erase(std::unique(under.begin(), under.end()), under.end());
-    coarse.surface_cells.insert(coarse.surface_cells.end(), under.begin(), under.end());
-  }
-  if (!body.surface_cell_offsets.empty())
-    coarse.surface_cell_offsets.push_back(static_cast<std::uint32_t>(coarse.surface_cells.size()));
-  derive_connections(coarse);
-  return result;
+  refuse_to_coarsen(body);
+  return coarsen(body, nullptr);
+}
+
+Coarsening coarsening(const Body& body, const std::array<CoarseGrid, 3>& grids) {
+  return coarsen(body, &grids);
 }
 
 Body coarsened(const Body& body) {

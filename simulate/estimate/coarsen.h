@@ -11,6 +11,7 @@
 // not whole get moments in turn, exact as theirs.
 #pragma once
 #include "formats/lattice/body.h"
+#include "simulate/estimate/coarse_grid.h"
 
 namespace flexel::simulate {
 
@@ -24,6 +25,13 @@ struct Coarsening {
   std::vector<std::uint32_t> offsets, cells;  // of fine cell c: cells[offsets[c]] to cells[offsets[c + 1]]
 };
 [[nodiscard]] Coarsening coarsening(const Body& body);
+// On these planes, of a body with one part. The coarse cells of a fine one come in the order of its places in the cuts along x, y
+// and z, x fastest.
+[[nodiscard]] Coarsening coarsening(const Body& body, const std::array<CoarseGrid, 3>& grids);
+// Throws where coarsened() does, but for a part one cell thick.
+void refuse_to_coarsen(const Body& body);
+// (surface) What of it a coarse body needs: all but the bytes of its source.
+[[nodiscard]] Surface without_bytes(const Surface& surface);
 
 // (elements) m: how far the matter under each element of `fine` has moved on the coarse body, trilinear in
 // the coarse cell that holds the element; zero for elements of broken cells alone.

@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <functional>
+#include <map>
 
 #include "base/error.h"
 #include "base/human.h"
@@ -15,8 +17,10 @@
 #include "base/stop.h"
 #include "formats/lattice/fields.h"
 #include "formats/lattice/quadratic_field.h"
+#include "formats/pieces/other_pieces.h"
 #include "simulate/equilibrium/equilibrium.h"
 #include "simulate/estimate/coarsen.h"
+#include "simulate/estimate/coarsen_pieces.h"
 #include "simulate/estimate/narrow_region.h"
 
 namespace flexel::simulate {
@@ -58,13 +62,129 @@ std::optional<double> thin_walls(const Body& body, double cells, bool quadratic)
   return share > kThinShare ? std::optional(share) : std::nullopt;
 }
 
+// How many times as fine a lattice needs to be for two cells through most walls, to a quarter; at least twice, and
+// that in model `quadratic`, whose cells hold walls of any thickness.
+double refinement_for_walls(const Body& body, bool quadratic) {
+  constexpr double kStep = 1.25, kMost = 64;
+  double finer = 2;
+  while (finer < kMost && thin_walls(body, kThinWall / finer, quadratic)) finer *= kStep;
+  return finer;
+}
+
+// The body's largest displacement; of all pieces where it is in pieces.
+LargestDisplacement largest_of_whole(const Body& body) {
+  if (!other_pieces()) return largest_displacement(body);
+  std::vector<Vec3> moved(body.element_count());
+  for (std::size_t e = 0; e < moved.size(); ++e) moved[e] = body.position[e] - body.rest[e];
+  const SurfacePiece piece{other_pieces()->polygons_with_cells(), other_pieces()->own_vertices()};
+  LargestDisplacement largest = largest_displacement(body, moved, &piece);
+  std::array<double, 6> told;
+  Eigen::Map<Vec3>(told.data()) = largest.displacement;
+  Eigen::Map<Vec3>(told.data() + 3) = largest.at;
+  (void)other_pieces()->take_of_largest(largest.value(), told);
+  largest.displacement = Eigen::Map<Vec3>(told.data());
+  largest.at = Eigen::Map<Vec3>(told.data() + 3);
+  return largest;
+}
+
+// On the region, or a point of the box around it.
+bool is_on(const Probe& probe, const std::vector<std::uint32_t>& region, const Body& body) {
+  if (probe.where) {
+    const std::vector<std::uint32_t> its = resolve(*probe.where, body).polygons;
+    return std::any_of(its.begin(), its.end(), [&](std::uint32_t each) {
+      return std::binary_search(region.begin(), region.end(), each);
+    });
+  }
+  Eigen::AlignedBox3d box;
+  for (const std::uint32_t polygon : region)
+    for (const std::uint32_t corner : body.surface.polygon(polygon))
+      box.extend(body.surface.vertices[corner]);
+  const Part& part = body.parts[body.surface.polygon_part(region.front())];
+  return probe.at && box.exteriorDistance(*probe.at) < part.lattice.spacing.mean();
+}
+
+// Held and loaded regions that the finest lattice does not resolve.
+struct NarrowRegions {
+  NarrowRegions(const Body& body, const Scene& scene)
+      : support(support_under_two_cells(body, scene)), loads(indentations_under_two_cells(body, scene)) {
+    for (const UnresolvedIndentation& each : loads) {
+      std::vector<std::uint8_t>& on = probes.emplace_back();
+      for (const Probe& probe : scene.probes) on.push_back(is_on(probe, each.polygons, body));
+    }
+  }
+  std::string support;
+  std::vector<UnresolvedIndentation> loads;
+  std::vector<std::vector<std::uint8_t>> probes;  // (loads x probes) 1: on the load's region
+};
+
+// What is asked of a lattice that a coarser one is made of.
+struct Finer {
+  const std::vector<Part>& parts;
+  std::function<Body()> coarsened;
+  std::function<bool()> has_thin_walls;  // of under two cells
+};
+
+Finer finer(const Body& body, bool quadratic) {
+  return {body.parts, [&body] { return coarsened(body); },
+          [&body, quadratic] { return thin_walls(body, kThinWall, quadratic).has_value(); }};
+}
+
+// What is asked of the finest lattice. Of a body in pieces all processes find it, and the first goes on with it.
+class Finest {
+ public:
+  Finest(const Body& body, const Scene& scene)
+      : cells(whole_cell_count(body)),
+        most(largest_of_whole(body)),
+        narrow(body, scene),
+        quadratic(QuadraticField::is_in(body)),
+        body_(body) {
+    if (!other_pieces()) return;
+    try {
+      half_ = coarsened_from_pieces(body);
+    } catch (const InputError& error) {
+      no_half_ = error.what();
+    }
+    for (const double thickness : {kThinWall, kFewCells}) found_[thickness] = thin(thickness);
+    if (!no_half_.empty() || found_[kThinWall]) refinement_ = refinement_for_walls(body, quadratic);
+  }
+
+  // The share of the matter in walls under so many cells, kThinWall or kFewCells, where it is too much for bars.
+  [[nodiscard]] std::optional<double> thin(double thickness) const {
+    const auto found = found_.find(thickness);
+    return found != found_.end() ? found->second : thin_walls(body_, thickness, quadratic);
+  }
+  [[nodiscard]] double refinement() const {
+    return refinement_ ? *refinement_ : refinement_for_walls(body_, quadratic);
+  }
+  [[nodiscard]] Finer as_finer() {
+    if (found_.empty()) return finer(body_, quadratic);
+    return {body_.parts, [this] { return half(); }, [this] { return thin(kThinWall).has_value(); }};
+  }
+
+  const std::size_t cells;
+  const LargestDisplacement most;
+  const NarrowRegions narrow;
+  const bool quadratic;
+
+ private:
+  [[nodiscard]] Body half() {
+    if (!no_half_.empty()) throw InputError(no_half_);
+    return std::move(half_);
+  }
+
+  const Body& body_;
+  std::map<double, std::optional<double>> found_;  // of a body in pieces, by thickness
+  std::optional<double> refinement_;               // likewise, where it may be asked for
+  Body half_;
+  std::string no_half_;
+};
+
 // Ratio of the spacings of two lattices of the same matter.
-double ratio_of(const Body& fine, const Body& coarse) {
+double ratio_of(const std::vector<Part>& fine, const Body& coarse) {
   double volumes = 0, weights = 0;
-  for (std::size_t p = 0; p < fine.parts.size(); ++p) {
-    const double cells = fine.parts[p].cell_end - fine.parts[p].cell_begin;
-    volumes +=
-        cells * std::log(coarse.parts[p].lattice.spacing.prod() / fine.parts[p].lattice.spacing.prod());
+  for (std::size_t p = 0; p < fine.size(); ++p) {
+    const double cells = fine[p].cell_end - fine[p].cell_begin;
+    volumes += cells * std::log(coarse.parts[p].lattice.spacing.prod() / fine[p].lattice.spacing.prod());
     weights += cells;
   }
   return std::exp(volumes / weights / 3);
@@ -73,15 +193,10 @@ double ratio_of(const Body& fine, const Body& coarse) {
 // The coarser runs, as many as can be done.
 class CoarseRuns {
  public:
-  CoarseRuns(const Body& body, const Scene& scene, const SimulateOptions& options,
-             const SimulateResult& result, const SolveCoarse& solve, Progress& progress)
-      : options_(options),
-        solve_(solve),
-        progress_(progress),
-        scene_(scene),
-        quadratic_(QuadraticField::is_in(body)) {
-    const StopWaits answered;
-    const LargestDisplacement most = largest_displacement(body);
+  CoarseRuns(const LargestDisplacement& most, bool quadratic, const Scene& scene,
+             const SimulateOptions& options, const SimulateResult& result, const SolveCoarse& solve,
+             Progress& progress)
+      : options_(options), solve_(solve), progress_(progress), scene_(scene), quadratic_(quadratic) {
     Probe probe;
     probe.name = "largest displacement";
     probe.at = most.at;
@@ -100,14 +215,14 @@ class CoarseRuns {
   // Adds one lattice; false, with the reason, where it cannot be done. A lattice whose cells are wider than
   // many walls says nothing beside a third one, nor beside a fine one that has not two cells through them:
   // both hold the matter, neither the shape, and may agree on a wrong value.
-  bool add(const Body& finer, Body& coarse, std::string& reason) {
+  bool add(const Finer& finer, Body& coarse, std::string& reason) {
     try {
-      coarse = coarsened(finer);
+      coarse = finer.coarsened();
       if (thin_walls(coarse, 1, quadratic_)) {
         if (found_.size() > 1) throw InputError("walls are thinner than its cells");
-        if (thin_walls(finer, kThinWall, quadratic_)) throw InputError("walls are thinner than two cells");
+        if (finer.has_thin_walls()) throw InputError("walls are thinner than two cells");
       }
-      ratio_.push_back(ratio_of(finer, coarse));
+      ratio_.push_back(ratio_of(finer.parts, coarse));
       const bool first = found_.size() == 1;
       ProgressStretch stretch(progress_, first ? 0 : kFirstRun, first ? kFirstRun : 1);
       found_.push_back(answers(solve_(coarse, scene_, options_, stretch.inner())));
@@ -154,30 +269,15 @@ class CoarseRuns {
   bool quadratic_;
 };
 
-// On the region, or a point of the box around it.
-bool is_on(const Probe& probe, const std::vector<std::uint32_t>& region, const Body& body) {
-  if (probe.where) {
-    const std::vector<std::uint32_t> its = resolve(*probe.where, body).polygons;
-    return std::any_of(its.begin(), its.end(), [&](std::uint32_t each) {
-      return std::binary_search(region.begin(), region.end(), each);
-    });
-  }
-  Eigen::AlignedBox3d box;
-  for (const std::uint32_t polygon : region)
-    for (const std::uint32_t corner : body.surface.polygon(polygon))
-      box.extend(body.surface.vertices[corner]);
-  const Part& part = body.parts[body.surface.polygon_part(region.front())];
-  return probe.at && box.exteriorDistance(*probe.at) < part.lattice.spacing.mean();
-}
-
 // No bar of the largest displacement, or of a probe on the loaded region, is narrower than what the surface gives way there
 // unseen by the lattices: they spread the load over a cell each, and may agree on too little.
-void hold_indentations(const Body& body, const Scene& scene, ErrorBars& errors) {
-  for (const UnresolvedIndentation& each : indentations_under_two_cells(body, scene)) {
+void hold_indentations(const NarrowRegions& narrow, ErrorBars& errors) {
+  for (std::size_t n = 0; n < narrow.loads.size(); ++n) {
+    const UnresolvedIndentation& each = narrow.loads[n];
     bool widened = false;
     for (ErrorBar& bar : errors.bars) {
       if (bar.of == ErrorBar::Of::elastic_energy) continue;
-      if (bar.of == ErrorBar::Of::probe && !is_on(scene.probes[bar.probe], each.polygons, body)) continue;
+      if (bar.of == ErrorBar::Of::probe && narrow.probes[n][bar.probe] == 0) continue;
       if (bar.bar.half_width >= each.depth) continue;
       bar.bar.half_width = each.depth;
       widened = true;
@@ -217,46 +317,39 @@ std::string of_one_difference(const std::string& reason, double least) {
       least > 0 ? fmt::format(" and at least {:.0f} % of the value", 100 * least) : "");
 }
 
-}  // namespace
-
-double refinement_for_walls(const Body& body) {
-  constexpr double kStep = 1.25, kMost = 64;
-  double finer = 2;
-  while (finer < kMost && thin_walls(body, kThinWall / finer, QuadraticField::is_in(body))) finer *= kStep;
-  return finer;
-}
-
-ErrorBars estimate_errors(const Body& body, const Scene& scene, const SimulateOptions& options,
-                          const SimulateResult& result, const SolveCoarse& solve, Progress& progress) {
+ErrorBars bars_beside(Finest& finest, const Scene& scene, const SimulateOptions& options,
+                      const SimulateResult& result, const SolveCoarse& solve, Progress& progress) {
   const auto began = std::chrono::steady_clock::now();
   ErrorBars errors;
-  errors.cells.push_back(body.cell_count());
-  const bool quadratic = QuadraticField::is_in(body);
-  CoarseRuns runs(body, scene, options, result, solve, progress);
+  errors.cells.push_back(finest.cells);
+  const bool quadratic = finest.quadratic;
+  CoarseRuns runs(finest.most, quadratic, scene, options, result, solve, progress);
   Body half, quarter;
   std::string reason;
-  if (!runs.add(body, half, reason)) {
+  if (!runs.add(finest.as_finer(), half, reason)) {
     errors.note = "a lattice twice as coarse cannot be solved: " + first_sentence(reason);
+    errors.refinement = finest.refinement();
     return errors;
   }
   errors.cells.push_back(half.cell_count());
   bool wide = false;
   double least = kUnevenLeaves;  // of the value, of bars without an order
-  if (runs.add(half, quarter, reason)) {
+  if (runs.add(finer(half, quadratic), quarter, reason)) {
     errors.cells.push_back(quarter.cell_count());
-    if (const std::optional<double> thin = thin_walls(body, kThinWall, quadratic)) {
+    if (const std::optional<double> thin = finest.thin(kThinWall)) {
       wide = true;
       errors.note = fmt::format(
           "{:.0f} % of the matter lies in walls under 2 cells: the bars are three times the "
           "largest difference; use a smaller spacing",
           100 * *thin);
-    } else if (const std::string narrow = support_under_two_cells(body, scene); !narrow.empty()) {
+    } else if (!finest.narrow.support.empty()) {
       wide = true;
-      errors.note = narrow + ": the bars are three times the largest difference; use a smaller spacing";
+      errors.note =
+          finest.narrow.support + ": the bars are three times the largest difference; use a smaller spacing";
     }
   } else {
     wide = true;
-    if (!quadratic) least = thin_walls(body, kFewCells, quadratic) ? kFewCellsLeave : kOneDifferenceLeaves;
+    if (!quadratic) least = finest.thin(kFewCells) ? kFewCellsLeave : kOneDifferenceLeaves;
     errors.note = of_one_difference(reason, quadratic ? 0 : least);
   }
   const auto bar = [&](const Sequence& values) {
@@ -269,7 +362,7 @@ ErrorBars estimate_errors(const Body& body, const Scene& scene, const SimulateOp
     errors.bars.push_back({probe ? ErrorBar::Of::probe : ErrorBar::Of::largest_displacement, probe ? p : 0,
                            probe ? result.probes[p].name : "", values.value[0], bar(values)});
   }
-  hold_indentations(body, scene, errors);
+  hold_indentations(finest.narrow, errors);
   const Sequence energy = runs.energy();
   errors.bars.push_back({ErrorBar::Of::elastic_energy, 0, "", energy.value[0], bar(energy)});
   const Sequence stress = runs.stress();
@@ -279,6 +372,24 @@ ErrorBars estimate_errors(const Body& body, const Scene& scene, const SimulateOp
   else if (!wide && stress.value[0] > 0)
     errors.von_mises = {stress.value, stress_bar(stress, !result.stress->beside.empty())};
   errors.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  return errors;
+}
+
+}  // namespace
+
+ErrorBars estimate_errors(const Body& body, const Scene& scene, const SimulateOptions& options,
+                          const SimulateResult& result, const SolveCoarse& solve, Progress& progress) {
+  std::optional<Finest> finest;
+  {
+    const StopWaits answered;
+    finest.emplace(body, scene);
+  }
+  ErrorBars errors;
+  const auto judge = [&] { errors = bars_beside(*finest, scene, options, result, solve, progress); };
+  if (other_pieces())
+    other_pieces()->let_first(judge);
+  else
+    judge();
   return errors;
 }
 

@@ -19,8 +19,4 @@ using SolveCoarse = std::function<SimulateResult(Body&, const Scene&, const Simu
                                         const SimulateResult& result, const SolveCoarse& solve,
                                         Progress& progress);
 
-// How many times as fine a lattice needs to be for two cells through most walls, to a quarter; at least twice, and
-// that in model `quadratic`, whose cells hold walls of any thickness.
-[[nodiscard]] double refinement_for_walls(const Body& body);
-
 }  // namespace flexel::simulate

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "base/math/area_vector.h"
+#include "formats/pieces/other_pieces.h"
 
 namespace flexel::simulate {
 namespace {
@@ -106,8 +107,11 @@ double distance_to(const ReEntrantEdge& edge, const Vec3& at) {
 
 std::string singular_beside(const Body& body, const std::vector<std::uint8_t>& tied, const Vec3& at,
                             double reach) {
-  for (std::size_t e = 0; e < tied.size(); ++e)
-    if (tied[e] >= 2 && (body.rest[e] - at).norm() <= reach) return tied[e] == 2 ? "a support" : "a bond";
+  std::uint8_t found = 0;
+  for (std::uint32_t e = 0; e < tied.size() && found == 0; ++e)
+    if (tied[e] >= 2 && counts_element(e) && (body.rest[e] - at).norm() <= reach) found = tied[e];
+  if (over_pieces(found == 2 ? 1 : 0) > 0) return "a support";
+  if (found > 2) return "a bond";  // bodies in pieces have none
   return re_entrant_edge_within(body.surface, at, reach) ? "a re-entrant edge" : "";
 }
 

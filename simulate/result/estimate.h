@@ -70,6 +70,7 @@ struct ErrorBars {
   std::optional<StressBar>
       von_mises;     // nothing without three lattices (`quadratic`: two), with thin walls, without stresses
   std::string note;  // why there are none, or why they are wide; "" else
+  double refinement = 2;  // how many times as fine a lattice needs to be for bars, where there are none
   std::vector<std::size_t> cells;  // of each lattice, the finest first
   double seconds = 0;
 };

@@ -220,12 +220,25 @@ def elements(body_read):
     return [(*map(int, at), int(piece)) for at, piece in zip(body_read.point_data["lattice_index"], body_read.point_data["piece"])]
 
 
-def same_on_pieces(ranks, pieces, text, part="bar.stl", size="2.5 mm", shared=True, stress=True):
+def same_bars(a, b):
+    """Error bars of two summaries. The coarser runs have a tolerance of 1e-6."""
+    expect(a["cells"] == b["cells"] and a["note"] == b["note"], f"lattices {a['cells']} and {b['cells']}, {a['note']!r} and {b['note']!r}")
+    expect([each["of"] for each in a["bars"]] == [each["of"] for each in b["bars"]] != [], f"bars of {a['bars']} and {b['bars']}")
+    for x, y in zip(a["bars"], b["bars"]):
+        for key in ("value", "bar", "extrapolated"):
+            expect(abs(x[key] - y[key]) <= 1e-4 * abs(y["bar"]) + 1e-5 * abs(y["value"]), f"{key} of {x['of']}: {x[key]} and {y[key]}")
+    x, y = a.get("largest_von_mises"), b.get("largest_von_mises")
+    expect((x is None) == (y is None), f"bars of the stress: {x} and {y}")
+    if y:
+        close(x["values"], y["values"], 1e-5, "the largest stress of each lattice")
+
+
+def same_on_pieces(ranks, pieces, text, part="bar.stl", size="2.5 mm", shared=True, stress=True, bars=False):
     """A body in pieces of which no rank has the whole: the answer of flexel-simulate, in each piece, ghosts too."""
     import numpy
     need_mpi()
     scene(text=text)
-    options = ("--no-estimate",) if stress else ("--no-estimate", "--no-stress")
+    options = (*(() if bars else ("--no-estimate",)), *(() if stress else ("--no-stress",)))
     expect_ok(run("flexel-voxelize", part, "--size", size, "-o", "whole.vtu"))
     expect_ok(run("flexel-voxelize", part, "--size", size, "--pieces", pieces, "-o", "parts.pvtu"))
     expect_ok(run("flexel-simulate", "scene.toml", "whole.vtu", "-o", "one.vtu", "--summary", "one.json", "--threads", "1", *options))
@@ -258,18 +271,36 @@ def same_on_pieces(ranks, pieces, text, part="bar.stl", size="2.5 mm", shared=Tr
     if stress:
         expect(abs(a.get("largest_von_mises_thin_walls", 0) - b.get("largest_von_mises_thin_walls", 0)) < 1e-9, "share of thin walls")
         expect(a["strength"].keys() == b["strength"].keys(), f"strength: {a['strength']} and {b['strength']}")
+        expect(a.get("largest_von_mises_beside") == b.get("largest_von_mises_beside"), "what the largest stress lies beside")
+    if bars:
+        same_bars(a["error_bars"], b["error_bars"])
     return a, b
 
 
 def test_no_rank_has_the_whole_on_two_ranks():
     box("bar.stl")
-    same_on_pieces(2, 2, SMALL)
-    same_on_pieces(2, 4, REGIONS)
+    same_on_pieces(2, 2, SMALL, bars=True)
+    same_on_pieces(2, 4, REGIONS, size="1.25 mm", bars=True)
 
 
 def test_no_rank_has_the_whole_on_four_ranks():
     box("bar.stl")
-    same_on_pieces(4, 4, REGIONS)
+    same_on_pieces(4, 4, REGIONS, bars=True)
+
+
+def test_pieces_without_error_bars_say_why():
+    """A plate one cell thick: as flexel-simulate says it, with the size that shows how sure it is."""
+    need_mpi()
+    write("plate.stl", binary_stl(box_triangles((40.0, 10.0, 2.5))))
+    scene(text='material = "steel"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = ["0 N", "0 N", "-1 N"]\n')
+    for pieces in ((), ("--pieces", "2")):
+        expect_ok(run("flexel-voxelize", "plate.stl", "--size", "2.5 mm", "-o", "parts.pvtu" if pieces else "whole.vtu", *pieces))
+    one = expect_ok(run("flexel-simulate", "scene.toml", "whole.vtu", "-o", "one.vtu")).err
+    told = expect_ok(mpi(2, "scene.toml", "parts.pvtu", "-o", "all.pvtu")).err
+    for row in ("how sure", "next"):
+        said = [[line.partition(row)[2] for line in text.splitlines() if f": {row} " in line] for text in (one, told)]
+        expect(said[0] == said[1] and len(said[0]) == 1, f"{row}: {said}")
+    expect("one cell thick" in one and "--size 1.25mm shows how sure" in one, one)
 
 
 def test_no_rank_has_the_whole_with_large_deflections():
@@ -321,8 +352,8 @@ tolerance = 1e-11
 
 
 def test_no_rank_has_the_whole_of_a_curved_part():
-    same_on_pieces(2, 2, ARCH, part=arch(), size="1.7 mm")
-    same_on_pieces(3, 3, ARCH, part=arch(), size="2.3 mm")
+    same_on_pieces(2, 2, ARCH, part=arch(), size="1.7 mm", bars=True)
+    same_on_pieces(3, 3, ARCH, part=arch(), size="1.1 mm", bars=True)
 
 
 def test_one_rank_puts_together_what_takes_the_whole():
