@@ -50,16 +50,16 @@ Vec3 end_of(Body body, const std::string& events) {
   return body.position.back() - body.rest.back();
 }
 
-// Twice as stiff everywhere: half as far.
+// Twice as stiff everywhere: half as far, but for what bending itself changes.
 TEST(EventsAtRest, AnEditActsBeforeTheLoad) {
   const Vec3 plain = end_of(resting_bar(), ""),
              edited = end_of(resting_bar(), "[[event]]\ndo = \"edit\"\nstiffness = 2\n");
-  EXPECT_NEAR(edited.z(), 0.5 * plain.z(), 1e-6 * std::abs(plain.z()));
+  EXPECT_NEAR(edited.z(), 0.5 * plain.z(), 1e-4 * std::abs(plain.z()));
   // in the order of the file: twice twice
   const Vec3 twice = end_of(resting_bar(),
                             "[[event]]\ndo = \"edit\"\nstiffness = 2\n[[event]]\ndo = "
                             "\"edit\"\nstiffness = 2\n");
-  EXPECT_NEAR(twice.z(), 0.25 * plain.z(), 1e-6 * std::abs(plain.z()));
+  EXPECT_NEAR(twice.z(), 0.25 * plain.z(), 1e-4 * std::abs(plain.z()));
 }
 
 // How far the second of two bars goes, all of whose matter is so many times as stiff: by its material, or by an edit.
