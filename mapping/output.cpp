@@ -45,9 +45,10 @@ MapOutput map_output(const std::string& format, const std::string& path, bool as
         fmt::format("{} keeps the unit of the part: leave out --unit", output.format->file->title));
   check_unit(*output.format, unit);
   if (attributes && !output.format->file->holds_attributes)
-    throw InputError(
-        fmt::format("--attributes: only {} and .vtu hold attributes of vertices: write one of them",
-                    written_titles([](const FileFormat& each) { return each.holds_attributes; }, "and")));
+    throw InputError(fmt::format(
+        "--attributes: {} holds no attributes of vertices, only {} and .vtu do: write no other surface",
+        output.format->file->title,
+        written_titles([](const FileFormat& each) { return each.holds_attributes; }, "and")));
   return output;
 }
 

@@ -206,13 +206,15 @@ bool stress_settles(const SimulateResult& result) {
   return result.error_bars.von_mises && result.error_bars.von_mises->bar;
 }
 
-// What is said of the largest stress where smaller cells would not confirm it, or were asked for in vain.
-std::string unsure(const SimulateResult& result) {
+// What is said of a stress where smaller cells would not confirm it, or were asked for in vain. Of another one than the
+// largest nobody looked at what lies beside it.
+std::string unsure(const SimulateResult& result, double stress) {
   const std::string not_closer =
       result.no_local_stress.empty() ? "" : "; not looked at closer: " + result.no_local_stress;
-  if (stress_settles(result)) return not_closer;
+  const bool is_largest = stress == result.stress->value;
+  if (is_largest && stress_settles(result)) return not_closer;
   const std::string& beside = result.stress->beside;
-  if (beside.empty()) return "; smaller cells may show more" + not_closer;
+  if (!is_largest || beside.empty()) return "; smaller cells may show more" + not_closer;
   std::string text = fmt::format("; smaller cells show more beside {}", beside);
   if (result.local_stress && result.local_stress->stress.beside.empty()) {
     const LocalStress& local = *result.local_stress;
@@ -247,7 +249,7 @@ std::string strength(const SimulateResult& result, const Body& body, const std::
   if (!found)
     return fmt::format("unknown of {}: its stress is {} at {}{}", material_of(body, result.stress->part),
                        peak_stress(result, result.stress->value), place_in_one_unit(result.stress->at),
-                       unsure(result));
+                       unsure(result, result.stress->value));
   if (!(found->share > 0)) return "nothing is stressed";
   if (found->nearest_share() <= 1 && result.stress->lacks_bending())
     return fmt::format(
@@ -263,7 +265,7 @@ std::string strength(const SimulateResult& result, const Body& body, const std::
                   factor(found->share), layers, peak_stress(result, found->stress),
                   human_pressure(found->limit), found->material, found->yields ? "yields" : "breaks",
                   place_in_one_unit(found->stress == result.stress->value ? result.stress->at : found->at),
-                  unsure(result));
+                  unsure(result, found->stress));
   std::vector<std::string> others;
   for (const std::string& part : found->too_weak)
     if (part != found->part) others.push_back(fmt::format("\"{}\"", part));

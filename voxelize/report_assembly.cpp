@@ -174,21 +174,20 @@ void say_gaps(const VoxelizeResult& result, Progress& progress) {
   }
   if (count == 0) return;
   const Body& body = result.body;
-  // A [[bond]] spans half a spacing.
+  // A [[bond]] spans half a spacing. Whether there is one the scene says.
   const double spanned = std::max(body.parts[widest->parts[0]].lattice.spacing.minCoeff(),
                                   body.parts[widest->parts[1]].lattice.spacing.minCoeff()) /
                          2;
   const std::string cure = 1.05 * widest->gap <= spanned
-                               ? fmt::format("[[bond]] with gap = \"{}\" in the scene joins them",
+                               ? fmt::format(": only [[bond]] with gap = \"{}\" in the scene joins them",
                                              human_length(1.05 * widest->gap))
-                               : "close the gap in CAD, or hold both";
+                               : ", and are not joined: close the gap in CAD, or hold both";
   if (count == 1)
-    progress.warn(fmt::format("parts {} miss each other by {}, less than a cell, and are not joined: {}",
-                              names_of(*widest, body), human_length(widest->gap), cure));
+    progress.warn(fmt::format("parts {} miss each other by {}, less than a cell{}", names_of(*widest, body),
+                              human_length(widest->gap), cure));
   else
-    progress.warn(
-        fmt::format("{} pairs of parts miss each other by less than a cell, {} by {}, and are not joined: {}",
-                    human_count(count), names_of(*widest, body), human_length(widest->gap), cure));
+    progress.warn(fmt::format("{} pairs of parts miss each other by less than a cell, {} by {}{}",
+                              human_count(count), names_of(*widest, body), human_length(widest->gap), cure));
 }
 
 }  // namespace

@@ -39,11 +39,13 @@ Weights jump(const TouchingPoint& point) {
 }
 
 // E / h of the softer side [Pa/m].
-double foundation(const TouchingPoint& point, const Problem& problem) {
-  const auto of = [&](std::uint32_t part) {
-    return problem.materials[part].young / problem.body.parts[part].lattice.spacing.mean();
+double foundation(const TouchingPoint& point, const Problem& problem, const ChangeAround& stiffer) {
+  const auto of = [&](std::size_t side) {
+    const std::uint32_t part = point.part[side];
+    return stiffer.at(point.at[side]) * problem.materials[part].young /
+           problem.body.parts[part].lattice.spacing.mean();
   };
-  return std::min(of(point.part[0]), of(point.part[1]));
+  return std::min(of(0), of(1));
 }
 
 // Bonds of [[bond]].
@@ -96,6 +98,7 @@ struct Resisting {
 
 Resisting resisting(const Problem& problem) {
   const std::vector<double> own = cell_frequencies(problem);
+  const QuickerByEdits quicker(problem.body);
   Resisting made{{}, lumped_masses(problem), {}};
   for (std::size_t p = 0; p < own.size(); ++p) {
     const Part& part = problem.body.parts[p];
@@ -109,7 +112,8 @@ Resisting resisting(const Problem& problem) {
     for (std::uint32_t e = part.element_begin; e < part.element_end; ++e) {
       whole += made.mass[e];
       made.node.push_back(rigid ? part.element_begin : e);
-      made.most.push_back(rigid ? std::numeric_limits<double>::infinity() : kMostOfCells * omega2);
+      made.most.push_back(rigid ? std::numeric_limits<double>::infinity()
+                                : kMostOfCells * quicker(e) * omega2);
     }
     if (rigid) made.mass[part.element_begin] = 0.25 * whole;
   }
@@ -176,12 +180,14 @@ std::optional<Bonds> Bonds::make(const Parameters& parameters, const Problem& pr
   std::map<std::vector<std::uint32_t>, Matrix> by_elements;
   std::map<std::array<std::uint32_t, 2>, double> area;
   const std::vector<std::uint8_t> joined = joined_parts(problem.body);
+  const ChangeAround stiffer(problem.body, "stiffness_change");
   for_each_touching_point(problem, named, [&](const TouchingPoint& point) {
     if (joined[point.part[0]] || joined[point.part[1]] || (!parameters.bond && !is_named(point.part))) return;
     const Weights weights = jump(point);
     auto [entry, fresh] =
         by_elements.try_emplace(elements_of(point), Matrix::Zero(weights.size(), weights.size()));
-    entry->second += kPenalty * foundation(point, problem) * point.area * weights * weights.transpose();
+    entry->second +=
+        kPenalty * foundation(point, problem, stiffer) * point.area * weights * weights.transpose();
     area[{std::min(point.part[0], point.part[1]), std::max(point.part[0], point.part[1])}] += point.area;
   });
   for (std::size_t n = 0; n < named.size(); ++n)

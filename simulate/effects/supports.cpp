@@ -146,6 +146,7 @@ void Supports::add_surface_tie(std::uint32_t tie, const std::vector<std::uint32_
   using Matrix = decltype(TiedElements::stiffness);
   std::map<std::array<std::uint32_t, 8>, TiedElements> by_elements;
   const std::size_t first = tied_.size();
+  const ChangeAround stiffer(problem.body, "stiffness_change");
   for (const SurfacePoint& point : points) {
     if ((problem.duration || ties_[tie].link) && lies_on_face(point.at)) {
       for (std::size_t a = 0; a < point.at.count; ++a)
@@ -153,7 +154,7 @@ void Supports::add_surface_tie(std::uint32_t tie, const std::vector<std::uint32_
       continue;
     }
     const std::uint32_t part = problem.body.surface.polygon_part(point.polygon);
-    const double stiffness = kPenalty * problem.materials[part].young /
+    const double stiffness = kPenalty * stiffer.at(point.at) * problem.materials[part].young /
                              problem.body.parts[part].lattice.spacing.mean() * point.area_vector.norm();
     const auto count = static_cast<Eigen::Index>(point.at.count);
     const Eigen::Map<const Eigen::VectorXd> weights(point.at.weights.data(), count);
@@ -171,6 +172,7 @@ void Supports::soften(std::size_t first, const Problem& problem) {
   const std::vector<double> omega2 = cell_frequencies(problem);
   const std::vector<double> mass = lumped_masses(problem);
   const std::vector<std::uint32_t> part = element_parts(problem.body);
+  const QuickerByEdits quicker(problem.body);
   std::map<std::uint32_t, int> sharers;
   for (std::size_t i = first; i < tied_.size(); ++i)
     for (std::size_t a = 0; a < tied_[i].count; ++a) ++sharers[tied_[i].elements[a]];
@@ -179,7 +181,7 @@ void Supports::soften(std::size_t first, const Problem& problem) {
     for (std::size_t a = 0; a < tied_[i].count; ++a) {
       const std::uint32_t e = tied_[i].elements[a];
       const double row = tied_[i].stiffness.row(static_cast<Eigen::Index>(a)).cwiseAbs().sum();
-      if (row > 0) scale = std::min(scale, omega2[part[e]] * mass[e] / (sharers[e] * row));
+      if (row > 0) scale = std::min(scale, quicker(e) * omega2[part[e]] * mass[e] / (sharers[e] * row));
     }
     tied_[i].stiffness *= scale;
   }

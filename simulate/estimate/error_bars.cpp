@@ -190,6 +190,19 @@ double ratio_of(const std::vector<Part>& fine, const Body& coarse) {
   return std::exp(volumes / weights / 3);
 }
 
+// Throws InputError: the flat faces of a part of model `springs` gave its coarser cells another shape than a cube.
+void refuse_uneven_cubes(const Body& coarse, const Scene& scene) {
+  const std::vector<Model> models = models_of_parts(scene, coarse);
+  for (std::size_t p = 0; p < models.size(); ++p) {
+    const Vec3& h = coarse.parts[p].lattice.spacing;
+    if (models[p] == Model::springs && h.maxCoeff() > (1 + 1e-6) * h.minCoeff())
+      throw InputError(
+          fmt::format("its cells of part \"{}\" would be no cubes, which model \"springs\" needs; where an "
+                      "even number of cells fits between flat faces they are",
+                      coarse.parts[p].name));
+  }
+}
+
 // The coarser runs, as many as can be done.
 class CoarseRuns {
  public:
@@ -218,6 +231,7 @@ class CoarseRuns {
   bool add(const Finer& finer, Body& coarse, std::string& reason) {
     try {
       coarse = finer.coarsened();
+      refuse_uneven_cubes(coarse, scene_);
       if (thin_walls(coarse, 1, quadratic_)) {
         if (found_.size() > 1) throw InputError("walls are thinner than its cells");
         if (finer.has_thin_walls()) throw InputError("walls are thinner than two cells");

@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/stop.h"
 #include "base/units.h"
+#include "simulate/matter/interpolation_weights.h"
 #include "simulate/models/cells.h"
 #include "simulate/models/rest_shape.h"
 #include "simulate/models/set_rest_shape.h"
@@ -102,12 +103,9 @@ class CellGrid {
   std::unordered_map<Bucket, std::vector<std::uint32_t>, BucketHash> buckets_;
 };
 
-// E h of the softer of two parts [N/m].
-double stiffness_between(const Problem& problem, std::uint32_t a, std::uint32_t b) {
-  const auto of = [&](std::uint32_t part) {
-    return problem.materials[part].young * problem.body.parts[part].lattice.spacing.mean();
-  };
-  return std::min(of(a), of(b));
+// E h of a part [N/m].
+double stiffness_of(const Problem& problem, std::uint32_t part) {
+  return problem.materials[part].young * problem.body.parts[part].lattice.spacing.mean();
 }
 
 // Elements at the centres of voxels: a connection for every two of different parts that are near, its length what it is
@@ -182,6 +180,7 @@ std::size_t fuse_parts(EventContext& context, const Chosen& chosen, const std::v
       for (const std::uint32_t e : body.cell_elements[c]) ++cells_at[e];
   const std::size_t before = context.fused.size();
   const std::set<ElementAndPart> known = fused_to_cells(context.fused, part_of);
+  const ChangeAround stiffer(body, "stiffness_change");
   std::size_t found = 0;
   for (std::uint32_t e = 0; e < body.element_count(); ++e) {
     if (e % 256 == 0) check_stop();
@@ -199,8 +198,12 @@ std::size_t fuse_parts(EventContext& context, const Chosen& chosen, const std::v
       const double gap = (now[e] - point_of(x, at->cwiseMax(0).cwiseMin(1))).norm();
       if (!(gap <= nearest) || (best && gap == nearest)) return;
       nearest = gap;
-      best = FusedPoint{{e}, {1}, stiffness_between(context.problem, part_of[e], part_of_cell[c])};
       const std::array<double, 8> weights = trilinear(*at);
+      best = FusedPoint{{e},
+                        {1},
+                        std::min(stiffer.of(e) * stiffness_of(context.problem, part_of[e]),
+                                 stiffer.at({body.cell_elements[c], weights, 8}) *
+                                     stiffness_of(context.problem, part_of_cell[c]))};
       for (std::size_t a = 0; a < 8; ++a) {
         best->elements.push_back(body.cell_elements[c][a]);
         best->weights.push_back(-weights[a]);

@@ -168,12 +168,13 @@ class JoinedBonds {
   [[nodiscard]] std::optional<Touching> touching(const MovedSample& point, const Vec3& normal,
                                                  const MovedSample& other, double limit) const;
   [[nodiscard]] double distance(const Vec3& rest, std::uint32_t polygon) const;
-  [[nodiscard]] double foundation(std::uint32_t a, std::uint32_t b) const;
+  [[nodiscard]] double foundation(std::uint32_t part, const InterpolationWeights& at) const;
 
   const Problem& problem_;
   const Body& body_;
   const State& state_;
-  double diagonal_;  // m, of the surface at rest
+  ChangeAround stiffer_;  // by edits
+  double diagonal_;       // m, of the surface at rest
   Triangles triangles_;
   std::vector<std::uint32_t> first_triangle_;  // (polygons + 1)
   std::vector<Box> box_;  // (parts) of the elements as they are now, with a spacing around
@@ -183,6 +184,7 @@ JoinedBonds::JoinedBonds(const Problem& problem, const State& state)
     : problem_(problem),
       body_(problem.body),
       state_(state),
+      stiffer_(problem.body, "stiffness_change"),
       diagonal_(bounding_box(problem.body.surface.vertices).diagonal()),
       triangles_(triangulate(problem.body.surface)) {
   first_triangle_.assign(body_.surface.polygon_count() + 1, 0);
@@ -267,12 +269,10 @@ void add_side(const InterpolationWeights& side, double sign, FusedPoint& held) {
   }
 }
 
-// E / h of the softer of two parts, times that of Bonds [Pa/m].
-double JoinedBonds::foundation(std::uint32_t a, std::uint32_t b) const {
-  const auto of = [&](std::uint32_t part) {
-    return problem_.materials[part].young / body_.parts[part].lattice.spacing.mean();
-  };
-  return Bonds::kPenalty * std::min(of(a), of(b));
+// E / h of the matter of a part that carries a point, times that of Bonds [Pa/m].
+double JoinedBonds::foundation(std::uint32_t part, const InterpolationWeights& at) const {
+  return Bonds::kPenalty * stiffer_.at(at) * problem_.materials[part].young /
+         body_.parts[part].lattice.spacing.mean();
 }
 
 void JoinedBonds::touch(std::uint32_t a, std::uint32_t b, double gap, std::vector<FusedPoint>& points,
@@ -298,8 +298,10 @@ void JoinedBonds::touch(std::uint32_t a, std::uint32_t b, double gap, std::vecto
         best = found;
     if (!best) continue;
     FusedPoint held;
-    held.stiffness = foundation(a, b) * point.point.area_vector.norm();
-    add_side(own.at(rest), 1, held);
+    const InterpolationWeights own_weights = own.at(rest);
+    held.stiffness = std::min(foundation(finer, own_weights), foundation(coarser, best->weights)) *
+                     point.point.area_vector.norm();
+    add_side(own_weights, 1, held);
     add_side(best->weights, -1, held);
     points.push_back(std::move(held));
   }

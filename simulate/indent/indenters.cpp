@@ -245,6 +245,7 @@ void Indenters::add_points(const std::vector<SurfacePoint>& points, const Proble
     return points[a].at.elements < points[b].at.elements;
   });
   points_.reserve(points.size());
+  const ChangeAround stiffer(problem.body, "stiffness_change");
   for (const std::uint32_t next : order) {
     const SurfacePoint& point = points[next];
     const std::uint32_t part = problem.body.surface.polygon_part(point.polygon);
@@ -257,8 +258,8 @@ void Indenters::add_points(const std::vector<SurfacePoint>& points, const Proble
     for (const double weight : point.at.weights) sum += std::abs(weight);
     Patch& patch = patches_.back();
     patch.spread = std::max(patch.spread, sum);
-    points_.push_back(
-        {point.at.weights, kPenalty * problem.materials[part].young / spacing * point.area_vector.norm()});
+    points_.push_back({point.at.weights, kPenalty * stiffer.at(point.at) * problem.materials[part].young /
+                                             spacing * point.area_vector.norm()});
     ++patch.end;
   }
 }

@@ -226,6 +226,36 @@ std::vector<double> spread(const Problem& problem, const std::vector<double>& sh
 
 }  // namespace
 
+ChangeAround::ChangeAround(const Body& body, const char* column) : factors_(element_factors(body, column)) {
+  const std::vector<double> of_cells = cell_factors(body, column);
+  if (of_cells.empty()) return;
+  factors_.resize(body.element_count(), 1);
+  std::vector<double> sum(body.element_count(), 0);
+  std::vector<std::uint32_t> around(body.element_count(), 0);
+  for (std::size_t c = 0; c < body.cell_count(); ++c) {
+    if (body.broken[c]) continue;
+    for (const std::uint32_t e : body.cell_elements[c]) {
+      sum[e] += of_cells[c];
+      ++around[e];
+    }
+  }
+  for (const Part& part : body.parts)
+    for (std::uint32_t e = part.element_begin; part.placement == Placement::corner && e < part.element_end;
+         ++e)
+      if (around[e] > 0) factors_[e] = sum[e] / around[e];
+}
+
+double ChangeAround::at(const InterpolationWeights& carrier) const {
+  if (factors_.empty()) return 1;
+  double sum = 0, total = 0;
+  for (std::uint32_t a = 0; a < carrier.count; ++a) {
+    const double weight = std::max(carrier.weights[a], 0.0);
+    sum += weight * factors_[carrier.elements[a]];
+    total += weight;
+  }
+  return total > 0 ? sum / total : 1;
+}
+
 std::vector<double> element_volumes(const Problem& problem) {
   return spread(problem, problem.body.fill, {});
 }

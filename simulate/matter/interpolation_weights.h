@@ -4,6 +4,7 @@
 // the half voxel between it and the surface matters, that element and its neighbours along the lattice's axes
 // (affine, exact for affine displacements).
 #pragma once
+#include <algorithm>
 #include <optional>
 #include <span>
 
@@ -75,6 +76,33 @@ class SurfaceCarriers {
 // A carrier of a cell stays as it is.
 [[nodiscard]] InterpolationWeights with_gradient(const Problem& problem, const InterpolationWeights& carrier,
                                                  const Vec3& point);
+
+// How many times what its material says edits made something of the matter around elements, such as column
+// "stiffness_change": the mean of the unbroken cells around an element, at centre placement its own factor.
+class ChangeAround {
+ public:
+  ChangeAround(const Body& body, const char* column);
+  [[nodiscard]] double of(std::uint32_t element) const { return factors_.empty() ? 1 : factors_[element]; }
+  // Where elements carry a point: the mean by their weights, of those above 0.
+  [[nodiscard]] double at(const InterpolationWeights& carrier) const;
+
+ private:
+  std::vector<double> factors_;  // (elements); empty: 1
+};
+
+// By how much edits raise the square of the frequency of the cells around an element: 1 at least, for what is slower
+// bears what its part does.
+class QuickerByEdits {
+ public:
+  explicit QuickerByEdits(const Body& body)
+      : stiffness_(body, "stiffness_change"), density_(body, "density_change") {}
+  [[nodiscard]] double operator()(std::uint32_t element) const {
+    return std::max(1.0, stiffness_.of(element) / density_.of(element));
+  }
+
+ private:
+  ChangeAround stiffness_, density_;
+};
 
 // (elements) m^3: the matter of each element that is simulated: its voxel (centre placement), or an eighth of
 // the filled volume of each unbroken cell around it.

@@ -70,6 +70,26 @@ struct Wrench {
   }
 };
 
+// Forces at places, and the size [N] of what they are together: their sum, and their moment about their own middle over
+// `reach`, for those of a couple sum up to nothing.
+class Acting {
+ public:
+  void add(const Vec3& force, const Vec3& at) {
+    force_ += force;
+    moment_ += at.cross(force);
+    middle_ += force.norm() * at;
+    weight_ += force.norm();
+  }
+  [[nodiscard]] double size(double reach) const {
+    if (!(weight_ > 0)) return 0;
+    return Wrench{force_, moment_ - (middle_ / weight_).cross(force_)}.over(reach).norm();
+  }
+
+ private:
+  Vec3 force_ = Vec3::Zero(), moment_ = Vec3::Zero(), middle_ = Vec3::Zero();
+  double weight_ = 0;
+};
+
 // Where the matter of a link is, from its middle.
 Vec3 arm_of(const RigidLink& link, const Vec3& rest, const Vec3& displacement) {
   return rest - link.middle + (link.small ? Vec3(Vec3::Zero()) : Vec3(displacement - link.translation));
@@ -177,11 +197,13 @@ Eigen::VectorXd LinkBalance::lacking(const LinkedNodes& nodes, double share, dou
 
 // N: loads and reactions, what is lacking is small beside them.
 double LinkBalance::forces(const LinkedNodes& nodes, double share, double safety) const {
-  double sum = 0;
+  double sum = 0, reach = 0;
+  for (const NitscheSupport* support : system_.linked())
+    reach = std::max(reach, support->tie->motion.link->reach);
   for (const NodalLoad& load : system_.loads()) {
-    Vec3 whole = Vec3::Zero();
-    for (const Vec3& each : load.forces) whole += each;
-    sum += share * whole.norm();
+    Acting whole;
+    for (std::size_t n = 0; n < load.forces.size(); ++n) whole.add(load.forces[n], system_.nodes().rest[n]);
+    sum += share * whole.size(reach);
   }
   for (const NitscheSupport& support : system_.supports()) {
     if (support.tie->link) {
@@ -189,13 +211,14 @@ double LinkBalance::forces(const LinkedNodes& nodes, double share, double safety
       sum += load_of(link, share).over(link.reach).norm();
       continue;
     }
-    Vec3 whole = Vec3::Zero();
+    Acting whole;
     for (const FacePoint& at : support.points)
-      whole +=
+      whole.add(
           reaction(system_.point(support, at, safety, share), of_cell(system_, at.cell, nodes.displacement),
-                   local_of(system_, nodes, at.cell), rotation_of(nodes, at.cell));
-    for (const std::uint32_t n : support.nodes) whole += nodes.unbalanced[n];
-    sum += whole.norm();
+                   local_of(system_, nodes, at.cell), rotation_of(nodes, at.cell)),
+          at.position);
+    for (const std::uint32_t n : support.nodes) whole.add(nodes.unbalanced[n], system_.nodes().rest[n]);
+    sum += whole.size(reach);
   }
   return sum;
 }

@@ -190,6 +190,13 @@ TEST(Answer, TheWeakestPartCounts) {
   two.materials[1].strength = 40e6;
   EXPECT_THAT(two.text(),
               HasSubstr("safety factor 2: about 20 MPa of 40 MPa at which PLA breaks, at (10, 0, 0) mm"));
+  // what lies beside the largest stress is said of that one alone, as its bar is
+  two.result.stress->beside = "a bond";
+  EXPECT_THAT(two.text(), HasSubstr("at (10, 0, 0) mm; smaller cells may show more\n"));
+  two.result.stress->beside = "";
+  two.result.error_bars.von_mises = simulate::StressBar{{47e6, 46e6, 40e6}, simulate::Bar{1e6, 47.5e6, 2}};
+  EXPECT_THAT(two.text(), HasSubstr("about 20 MPa of 40 MPa"));
+  EXPECT_THAT(two.text(), HasSubstr("at (10, 0, 0) mm; smaller cells may show more\n"));
 }
 
 // The largest stress is the steel's, a fifth of its limit: a program that reads on needs the other part's too.

@@ -118,6 +118,14 @@ TEST(StressBar, DoesNotTrustASuddenArrival) {
   EXPECT_NEAR(stress_bar(stresses([](double h) { return 5 + 0.1 * h * h; }))->half_width, 0.3, 1e-9);
 }
 
+// What flat faces make of coarser cells no option of flexel-voxelize changes: the note gives none.
+TEST(ErrorBars, CellsOfSpringsThatWouldBeNoCubesAreToldSo) {
+  const SimulateResult result = end_loaded(testing::corner_beam(5), testing::held_beam("springs"));
+  EXPECT_THAT(result.error_bars.note, HasSubstr("would be no cubes"));
+  EXPECT_THAT(result.error_bars.note, ::testing::Not(HasSubstr("--align")));
+  EXPECT_FALSE(end_loaded(testing::corner_beam(4), testing::held_beam("springs")).error_bars.bars.empty());
+}
+
 // Coarse cells put the largest stress some way from the clamp, where three values may seem to close in.
 TEST(ErrorBars, TheStressAtAClampHasNoneAtAnySpacing) {
   for (const int n : less_if_sanitized<std::vector<int>>({6, 8, 12, 16}, {6, 8}, "two spacings of four")) {

@@ -1,4 +1,5 @@
 // Events of a scene without a time: they change the body before equilibrium is looked for.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -6,6 +7,7 @@
 #include "formats/lattice/body_file.h"
 #include "formats/lattice/fields.h"
 #include "formats/lattice/fused_points.h"
+#include "formats/lattice/merge.h"
 #include "simulate/scene/scene.h"
 #include "simulate/scene/strength.h"
 #include "tests/scratch.h"
@@ -48,16 +50,49 @@ Vec3 end_of(Body body, const std::string& events) {
   return body.position.back() - body.rest.back();
 }
 
-// Twice as stiff everywhere: half as far, but for the springs of the fix, which the edit leaves.
+// Twice as stiff everywhere: half as far, but for what bending itself changes.
 TEST(EventsAtRest, AnEditActsBeforeTheLoad) {
   const Vec3 plain = end_of(resting_bar(), ""),
              edited = end_of(resting_bar(), "[[event]]\ndo = \"edit\"\nstiffness = 2\n");
-  EXPECT_NEAR(edited.z(), 0.5 * plain.z(), 1e-3 * std::abs(plain.z()));
+  EXPECT_NEAR(edited.z(), 0.5 * plain.z(), 1e-4 * std::abs(plain.z()));
   // in the order of the file: twice twice
   const Vec3 twice = end_of(resting_bar(),
                             "[[event]]\ndo = \"edit\"\nstiffness = 2\n[[event]]\ndo = "
                             "\"edit\"\nstiffness = 2\n");
-  EXPECT_NEAR(twice.z(), 0.25 * plain.z(), 2e-3 * std::abs(plain.z()));
+  EXPECT_NEAR(twice.z(), 0.25 * plain.z(), 1e-4 * std::abs(plain.z()));
+}
+
+// How far the second of two bars goes, all of whose matter is so many times as stiff: by its material, or by an edit.
+Vec3 moved_at(double stiffer, bool by_edit, const std::string& top, const std::string& text, double gap) {
+  Body body = resting_bar();
+  append(body, resting_bar("other", Vec3(6 * kBarCell + gap, 0, 0)));
+  const std::string gum = fmt::format(
+      "material = \"gum\"\n[materials.gum]\nyoung = \"{} MPa\"\npoisson = 0.3\ndensity = \"1000 "
+      "kg/m3\"\n",
+      by_edit ? 1 : stiffer);
+  const std::string edit = by_edit ? fmt::format("[[event]]\ndo = \"edit\"\nstiffness = {}\n", stiffer) : "";
+  (void)simulate_quietly(body, parse_scene(top + gum + edit + text, "s.toml"));
+  return body.position.back() - body.rest.back();
+}
+
+// What holds matter, what parts have between them and what pushes it is as stiff as the matter that it touches.
+TEST(EventsAtRest, WhatTouchesEditedMatterIsAsStiffAsIt) {
+  const std::string bent =
+      "[[fix]]\nwhere = \"bar/x0\"\n[[load]]\nwhere = \"other/x1\"\nforce = [0, 0, \"-0.02 N\"]\n";
+  const std::string pressed =
+      "[[fix]]\nwhere = \"bar/x0\"\n[[fix]]\nwhere = \"other/x1\"\naxes = "
+      "\"yz\"\n[[load]]\nwhere = \"other/x1\"\nforce = [\"-0.2 N\", 0, 0]\n";
+  const std::string dented =
+      "[[fix]]\nwhere = \"bar/x0\"\n[[indenter]]\nball = { centre = [\"110 mm\", \"10 mm\", \"40 mm\"], "
+      "radius = \"20 mm\" }\ndisplacement = [0, 0, \"-2 mm\"]\n";
+  const std::string fuse = "[[event]]\ndo = \"fuse\"\nwithin = \"1 mm\"\n";
+  using Case = std::tuple<const char*, std::string, double>;
+  for (const auto& [top, text, gap] :
+       {Case{"", bent, 0}, Case{"", dented, 0}, Case{"contact = true\n", pressed, 0},
+        Case{"bond = false\n", fuse + bent, 5e-4}}) {
+    const Vec3 made = moved_at(100, false, top, text, gap), edited = moved_at(100, true, top, text, gap);
+    EXPECT_LT((edited - made).norm(), 1e-4 * made.norm()) << text;
+  }
 }
 
 // As a timed run with the event at its start leaves the body, so equilibrium has it.

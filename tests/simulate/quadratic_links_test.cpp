@@ -210,6 +210,31 @@ TEST(QuadraticLinks, ARigidPartIsALink) {
     }
 }
 
+// The forces of a couple sum up to nothing, and what is lacking is small beside the couple all the same.
+TEST(QuadraticLinks, ACoupleTurnsARigidPart) {
+  const std::string held = stuff("quadratic", 0.3) + "[[fix]]\nwhere = \"near/x0\"\n";
+  const auto turned_by = [](const SimulateResult& result, const char* name) {
+    return *std::find_if(result.loads.begin(), result.loads.end(), [&](const AppliedLoad& load) {
+              return load.name == name;
+            })->rotation;
+  };
+  for (const Vec3& couple : {Vec3(1e-7, 0, 0), Vec3(0, 1e-7, 2e-7)}) {
+    Body whole = two_bars(),
+         alone = testing::box_body({.cells = {4, 1, 1}, .spacing = Vec3::Constant(0.01), .name = "near"});
+    const SimulateResult rigid = run_linked(
+        whole, held + "[parts.far]\nrigid = true\n[[load]]\nwhere = \"far/y0\"\n" + torque(couple));
+    const Vec3 end = *run_linked(alone, held + rigid_load(torque(couple), "near/x1")).loads[0].rotation;
+    EXPECT_LT((turned_by(rigid, "far") - end).norm(), 5e-3 * end.norm());
+  }
+  Body led = two_bars();
+  const SimulateResult twisted = run_linked(
+      led,
+      held +
+          "[parts.far]\nrigid = true\n[[move]]\nwhere = \"far/x1\"\nrotation = { axis = [1, 0, 0], through = "
+          "[0, \"5 mm\", \"5 mm\"], angle = \"0.01 rad\" }\n");
+  EXPECT_NEAR(turned_by(twisted, "far").x(), 0.01, 1e-5);
+}
+
 // Steel on rubber: what holds the steel is 1e-10 of it. The rubber's end turns by F L (L / 2 + a) / (E I).
 TEST(QuadraticLinks, ARigidPartOfSteelIsHeldByRubber) {
   const double length = 0.04, arm = 0.2, stiffness = 1e6 * std::pow(0.01, 4) / 12, push = 1e-7;

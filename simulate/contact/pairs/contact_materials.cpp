@@ -18,7 +18,10 @@ constexpr double kMostPullOff = 0.35;  // spacings, at most, of the extension at
 
 ContactMaterials::ContactMaterials(const ContactSettings& settings, const Problem& problem,
                                    const ContactSurface& surface)
-    : settings_(settings), surface_(surface), slides_(element_factors(problem.body, "friction_change")) {
+    : settings_(settings),
+      surface_(surface),
+      slides_(element_factors(problem.body, "friction_change")),
+      stiffer_(problem.body, "stiffness_change") {
   for (std::size_t p = 0; p < problem.body.parts.size(); ++p) {
     const Material& material = problem.materials[p];
     foundation_.push_back(kStiffness * settings.stiffness * material.young /
@@ -43,7 +46,7 @@ PairProperties ContactMaterials::against_plane(std::uint32_t point, const Contac
   const double traction =
       at.shape == ContactShape::edge ? 0 : 0.5 * (stick(point) + plane.stick.value_or(stick(point)));
   return {plane_constants(point), 0.5 * (own + plane.friction.value_or(own)),
-          pull_off(point, traction, foundation_[at.part]), kFarthestSoft * at.width};
+          pull_off(point, traction, foundation(point)), kFarthestSoft * at.width};
 }
 
 bool ContactMaterials::dissipate() const {
@@ -55,11 +58,17 @@ bool ContactMaterials::dissipate() const {
   return any;
 }
 
+// Pa/m
+double ContactMaterials::foundation(std::uint32_t point) const {
+  const ContactPoint& at = surface_.points()[point];
+  return foundation_[at.part] * stiffer_.at(at.at);
+}
+
 // Pa/m: springs in series, scaled so that two equal parts have that of each; two balls have the mean, as in
 // the paper (section 3.2), unless one is of a rigid part, whose own stiffness says nothing.
 double ContactMaterials::foundation(std::uint32_t i, std::uint32_t j) const {
   const ContactPoint &from = surface_.points()[i], &to = surface_.points()[j];
-  const double a = foundation_[from.part], b = foundation_[to.part];
+  const double a = foundation(i), b = foundation(j);
   const bool balls = from.radius > 0 && to.radius > 0;
   return balls && !rigid_[from.part] && !rigid_[to.part] ? 0.5 * (a + b) : 2 * a * b / (a + b);
 }
@@ -106,7 +115,7 @@ PairConstants ContactMaterials::constants(std::uint32_t i, std::uint32_t j) cons
 PairConstants ContactMaterials::plane_constants(std::uint32_t i) const {
   const ContactPoint& point = surface_.points()[i];
   PairConstants pair;
-  pair.stiffness = foundation_[point.part] * point.area;
+  pair.stiffness = foundation(i) * point.area;
   pair.facing_from = point.facing_from;
   pair.facing_fully = point.facing_fully;
   pair.limit = std::numeric_limits<double>::infinity();

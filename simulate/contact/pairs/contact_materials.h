@@ -25,6 +25,7 @@ class ContactMaterials {
   [[nodiscard]] bool dissipate() const;
 
  private:
+  [[nodiscard]] double foundation(std::uint32_t point) const;
   [[nodiscard]] double foundation(std::uint32_t i, std::uint32_t j) const;
   [[nodiscard]] double stick(std::uint32_t point) const;
   [[nodiscard]] double friction(std::uint32_t point) const;
@@ -39,6 +40,7 @@ class ContactMaterials {
   std::vector<double> stick_;        // (parts) Pa; infinity: glue
   std::vector<std::uint8_t> rigid_;  // (parts)
   std::vector<double> slides_;       // (elements) factors of friction; empty: 1
+  ChangeAround stiffer_;             // by edits
 };
 
 }  // namespace flexel::simulate
