@@ -208,14 +208,14 @@ void refuse_loose_fragments(const Fragments& fragments, const Body& body,
     throw InputError(
         scene,
         fmt::format("part \"{}\" is in {} pieces that are not {}connected; the one of {} {} near {} hangs "
-                    "{}: fix it too, or {} if it should be joined",
+                    "{}: fix it too, or {} if it should be joined{}",
                     part, fragments_of_part[fragment.part], fragment.hinged ? "firmly " : "",
                     human_count(fragment.size),
                     body.parts[fragment.part].placement == Placement::centre ? "elements" : "cells",
                     near(fragment.centre),
                     fragment.hinged ? "on the rest by edges and corners of cells alone, which let it turn"
                                     : "on nothing",
-                    words.a_finer_size));
+                    words.a_finer_size, fragment.hinged ? "" : " (over a gap: --heal wrap)"));
   }
 }
 

@@ -217,6 +217,20 @@ def test_lost_features_are_named():
     expect("walls" not in expect_ok(run("flexel-voxelize", "cube.stl", "--size", "4 mm", "-o", "body.vtu")).err, "no thin wall")
 
 
+def test_a_gap_is_closed_as_the_message_says():
+    """Two bars of one solid, a hundredth of a millimetre apart."""
+    far = [[(x + 20.01, y, z) for x, y, z in triangle] for triangle in box_triangles((20.0, 10.0, 10.0))]
+    write("two.stl", binary_stl(box_triangles((20.0, 10.0, 10.0)) + far))
+    write("s.toml", 'material = "PLA"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = ["0 N", "0 N", "-1 N"]\n')
+    for option in ((), ("--heal", "wrap")):
+        expect_ok(run("flexel-voxelize", "two.stl", "--size", "2.5 mm", *option, "-o", "b.vtu"))
+        done = run("flexel-simulate", "s.toml", "b.vtu", "-o", "o.vtu", "--force")
+        if option:
+            expect("well, within" in expect_ok(done).err, done.err)
+        else:
+            expect_error(done, "flexel-simulate", "2 pieces that are not connected", "(over a gap: --heal wrap)")
+
+
 def test_unknown_words():
     write("part.stl", binary_stl(box_triangles()))
     expect_error(run("flexel-voxelize", "part.stl", "--heal", "warp"), "flexel-voxelize", "--heal", 'did you mean "wrap"')
