@@ -226,7 +226,7 @@ def test_a_gap_is_closed_as_the_message_says():
         expect_ok(run("flexel-voxelize", "two.stl", "--size", "2.5 mm", *option, "-o", "b.vtu"))
         done = run("flexel-simulate", "s.toml", "b.vtu", "-o", "o.vtu", "--force")
         if option:
-            expect("well, within" in expect_ok(done).err, done.err)
+            expect("how far" in expect_ok(done).err, done.err)
         else:
             expect_error(done, "flexel-simulate", "2 pieces that are not connected", "(over a gap: --heal wrap)")
 
