@@ -33,6 +33,10 @@ export async function savePicture(picture, name) {
   save(await pictureBlob(picture), name + ".png");
 }
 
+const slice = 100;  // ms, between what the encoder hands over
+const longestWait = 20000;  // ms
+const headerBytes = 256;  // of a WebM without a frame, at most
+
 export class Recorder {
   static get possible() { return typeof MediaRecorder === "function" && MediaRecorder.isTypeSupported("video/webm"); }
 
@@ -44,15 +48,23 @@ export class Recorder {
   start() {
     compose(this.picture, this.target);
     this.chunks = [];
+    this.bytes = 0;
     this.recorder = new MediaRecorder(this.target.captureStream(30), {mimeType: "video/webm", videoBitsPerSecond: 8e6});
-    this.recorder.ondataavailable = event => this.chunks.push(event.data);
+    this.recorder.ondataavailable = event => {
+      this.chunks.push(event.data);
+      this.bytes += event.data.size;
+    };
     this.picture.onDraw = () => compose(this.picture, this.target);
-    this.recorder.start();
+    this.recorder.start(slice);
   }
 
-  // The WebM as a blob.
-  stop() {
+  // The WebM as a blob. A busy machine encodes late: not before a frame is in it.
+  async stop() {
     this.picture.onDraw = undefined;
+    for (let waited = 0; this.bytes <= headerBytes && waited < longestWait; waited += slice) {
+      compose(this.picture, this.target);
+      await new Promise(done => setTimeout(done, slice));
+    }
     return new Promise(resolve => {
       this.recorder.onstop = () => resolve(new Blob(this.chunks, {type: "video/webm"}));
       this.recorder.stop();
