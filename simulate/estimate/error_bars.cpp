@@ -231,11 +231,11 @@ class CoarseRuns {
   bool add(const Finer& finer, Body& coarse, std::string& reason) {
     try {
       coarse = finer.coarsened();
-      refuse_uneven_cubes(coarse, scene_);
       if (thin_walls(coarse, 1, quadratic_)) {
         if (found_.size() > 1) throw InputError("walls are thinner than its cells");
         if (finer.has_thin_walls()) throw InputError("walls are thinner than two cells");
       }
+      refuse_uneven_cubes(coarse, scene_);  // thin walls come first: they make the displacement a guess
       ratio_.push_back(ratio_of(finer.parts, coarse));
       const bool first = found_.size() == 1;
       ProgressStretch stretch(progress_, first ? 0 : kFirstRun, first ? kFirstRun : 1);

@@ -126,6 +126,14 @@ TEST(ErrorBars, CellsOfSpringsThatWouldBeNoCubesAreToldSo) {
   EXPECT_FALSE(end_loaded(testing::corner_beam(4), testing::held_beam("springs")).error_bars.bars.empty());
 }
 
+// They make the displacement a first guess, whatever the coarser cells would be besides.
+TEST(ErrorBars, ThinWallsOfSpringsAreToldBeforeUnevenCubes) {
+  const Body plate =
+      testing::box_body({.cells = {25, 10, 2}, .fill = [](int, int, int k) { return k == 0 ? 1 : 0.5; }});
+  EXPECT_THAT(end_loaded(plate, testing::held_beam("springs")).error_bars.note,
+              HasSubstr("walls are thinner than two cells"));
+}
+
 // Coarse cells put the largest stress some way from the clamp, where three values may seem to close in.
 TEST(ErrorBars, TheStressAtAClampHasNoneAtAnySpacing) {
   for (const int n : less_if_sanitized<std::vector<int>>({6, 8, 12, 16}, {6, 8}, "two spacings of four")) {
