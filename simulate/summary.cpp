@@ -401,10 +401,16 @@ std::string summary_json(const SimulateResult& result, const Body& body,
 
 std::vector<std::string> unresolved(const Body& body) {
   std::vector<std::string> lines;
-  const auto note = body.notes.find(kUnresolvedNote);
-  if (note == body.notes.end()) return lines;
-  std::istringstream text(note->second);
-  for (std::string line; std::getline(text, line);) lines.push_back(line);
+  const std::string only = body.parts.size() == 1 ? fmt::format(" of \"{}\"", body.parts[0].name) : "";
+  for (const bool walls : {true, false}) {
+    const auto note = body.notes.find(walls ? kLostWallsNote : kJoinedPiecesNote);
+    if (note == body.notes.end() || (walls && QuadraticField::is_in(body))) continue;
+    std::istringstream text(note->second);
+    for (std::string line; std::getline(text, line);) {
+      if (const std::size_t at = line.find(only); at != std::string::npos) line.erase(at, only.size());
+      lines.push_back(line);
+    }
+  }
   return lines;
 }
 

@@ -15,7 +15,7 @@ namespace flexel::simulate {
                                        const std::vector<Material>& materials,
                                        const std::vector<std::string>& told = {});
 
-// What its lattice does not resolve, of the note that voxelizing left.
+// What its lattice does not resolve, of the notes that voxelizing left; part by part where there are several.
 [[nodiscard]] std::vector<std::string> unresolved(const Body& body);
 
 // The result in lines for people.

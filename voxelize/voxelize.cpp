@@ -427,20 +427,19 @@ Made correct_count(Made made, double spacing, std::vector<HealedPart>& meshes,
   return made;
 }
 
-// What of the parts' shape the lattice does not have, a line each; cells with moments have walls of any thickness.
-std::string unresolved(const VoxelizeResult& result, bool with_moments) {
-  std::string lines;
-  for (std::size_t p = 0; p < result.parts.size(); ++p) {
-    const VoxelizedPart& part = result.parts[p];
-    const std::string of =
-        result.parts.size() == 1 ? "" : fmt::format(" of \"{}\"", result.body.parts[p].name);
-    if (part.lost_walls > 0 && !with_moments)
-      append_text(lines, "walls thinner than a cell{} ({} of the places measured)\n", of,
+// Writes into the body what of the parts' shape the lattice does not have.
+void note_what_is_lost(const std::vector<VoxelizedPart>& parts, Body& body) {
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    const VoxelizedPart& part = parts[p];
+    const std::string& name = body.parts[p].name;
+    if (part.lost_walls > 0)
+      append_text(body.notes[kLostWallsNote],
+                  "walls of \"{}\" thinner than a cell ({} of the places measured)\n", name,
                   human_share(static_cast<double>(part.lost_walls) / static_cast<double>(part.wall_samples)));
     if (part.undecided_voxels > 0)
-      append_text(lines, "pieces in {}{} taken as one\n", counted(part.undecided_voxels, "voxel"), of);
+      append_text(body.notes[kJoinedPiecesNote], "pieces of \"{}\" in {} taken as one\n", name,
+                  counted(part.undecided_voxels, "voxel"));
   }
-  return lines;
 }
 
 // Everything but the bodies of pieces. `meshes`: set to the parts, healed and on their lattices.
@@ -478,8 +477,7 @@ Made make(Surface surface, const VoxelizeOptions& options, std::vector<HealedPar
   result.pairs = noteworthy_pairs(meshes, cell);
   refuse_duplicates(result.pairs, result.body.surface);
   result.with_moments = options.moments;
-  if (const std::string lines = unresolved(result, options.moments); !lines.empty())
-    result.body.notes[kUnresolvedNote] = lines;
+  note_what_is_lost(result.parts, result.body);
   result.simulation_memory = simulation_memory(cells, options.placement, options.moments);
   return made;
 }

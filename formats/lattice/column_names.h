@@ -41,9 +41,10 @@ constexpr const char* kPrincipalColumn = "principal_stress";  // Pa, 3, descendi
 constexpr const char* kYieldColumn =
     "yield_share";  // of the material's `yield`; -1 where it has none. Vertices only
 
-// Note: what of a part's shape its lattice does not have, a line each. No error bar counts it, for coarser lattices have it
-// no more.
-constexpr const char* kUnresolvedNote = "unresolved";
+// Notes: what of the parts' shape the lattice does not have, a line for each part. No error bar counts it, for coarser lattices have
+// it no more. Walls thinner than a cell, which model `quadratic` has; and voxels whose pieces were taken as one.
+constexpr const char* kLostWallsNote = "lost_walls";
+constexpr const char* kJoinedPiecesNote = "joined_pieces";
 
 // Whether a run (of model `quadratic`) left stresses at the surface's vertices: then columns of these names there are not the
 // part's own.

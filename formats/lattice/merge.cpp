@@ -104,7 +104,8 @@ void append(Body& body, Body other) {
   fused.insert(fused.end(), others_fused.begin(), others_fused.end());
   for (const auto& [key, places] : kNotesOfParts)
     if (other.notes.contains(key)) body.notes[key] += with_parts_from(other.notes[key], places, parts);
-  if (other.notes.contains(kUnresolvedNote)) body.notes[kUnresolvedNote] += other.notes[kUnresolvedNote];
+  for (const char* key : {kLostWallsNote, kJoinedPiecesNote})
+    if (other.notes.contains(key)) body.notes[key] += other.notes[key];
   for (const auto& [key, note] : other.notes) body.notes.try_emplace(key, note);
   set_fused_points(body, fused);
 }

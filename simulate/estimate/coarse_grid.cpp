@@ -157,14 +157,14 @@ GridCut cut(const CoarseGrid& grid, std::int32_t index) {
   return result;
 }
 
-std::array<CoarseGrid, 3> choose_grids(const Body& body, const Part& part, const FacePairs& pairs) {
+std::array<CoarseGrid, 3> choose_grids(const Body& body, const Part& part, const FacePairs& pairs,
+                                       bool doubled) {
   std::array<FlatFaces, 3> faces;
   std::array<CoarseGrid, 3> grids;
-  const bool with_moments = over_pieces(body.moment_cells.empty() ? 0 : 1) > 0;
   std::size_t thinnest = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     faces[axis] = flat_faces(body, part, pairs, axis);
-    grids[axis] = with_moments ? doubled_grid(faces[axis]) : choose_grid(faces[axis], kDoubled, part.name);
+    grids[axis] = doubled ? doubled_grid(faces[axis]) : choose_grid(faces[axis], kDoubled, part.name);
     if (faces[axis].area.size() < faces[thinnest].area.size()) thinnest = axis;
   }
   // Cells of another shape have another error: where the part is thin and must stay finer, all axes do.

@@ -29,7 +29,8 @@ struct GridCut {
 // thinnest takes less, the others come near to that. Throws InputError: a part one cell thick. A body with moments
 // gets a pitch of 2 from a plane of its own everywhere: no cell is cut, for what of its moments lies on either side
 // of a cut is not known.
+// `doubled`: of such a body.
 [[nodiscard]] std::array<CoarseGrid, 3> choose_grids(const Body& body, const Part& part,
-                                                     const FacePairs& pairs);
+                                                     const FacePairs& pairs, bool doubled);
 
 }  // namespace flexel::simulate

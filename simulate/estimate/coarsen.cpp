@@ -265,7 +265,8 @@ Coarsening coarsen(const Body& body, const std::array<CoarseGrid, 3>* grids) {
   Coarsening result{{}, {0}, {}};
   Body& coarse = result.body;
   for (const Part& each : body.parts) {
-    PartCoarsening part(body, each, pairs, grids ? *grids : choose_grids(body, each, pairs));
+    PartCoarsening part(body, each, pairs,
+                        grids ? *grids : choose_grids(body, each, pairs, !body.moment_cells.empty()));
     part.append_to(coarse);
     if (with_moments) part.append_moments(coarse);
     for (std::uint32_t c = each.cell_begin; c < each.cell_end; ++c) {

@@ -248,13 +248,18 @@ void refuse_together(const Body& body) {
 
 }  // namespace
 
+bool have_moments(const Body& body) {
+  return over_pieces(body.moment_cells.empty() ? 0 : 1) > 0;
+}
+
 Body coarsened_from_pieces(const Body& body) {
   refuse_together(body);
   const FacePairs pairs = face_pairs(body);
   Lattice lattice;
   Packer packer;
   {
-    OwnCoarse own = coarsen_own(body, choose_grids(body, body.parts[0], pairs), pairs, lattice);
+    OwnCoarse own =
+        coarsen_own(body, choose_grids(body, body.parts[0], pairs, have_moments(body)), pairs, lattice);
     visit_own(packer, own);
   }
   std::vector<Bytes> gathered = other_pieces()->gather(std::move(packer.bytes));

@@ -9,4 +9,7 @@ namespace flexel::simulate {
 // together; all throw what coarsened() throws.
 [[nodiscard]] Body coarsened_from_pieces(const Body& body);
 
+// Whether any piece has moments: the planes of coarser lattices keep off the cells then. Of all processes together.
+[[nodiscard]] bool have_moments(const Body& body);
+
 }  // namespace flexel::simulate

@@ -144,8 +144,9 @@ class Finest {
     } catch (const InputError& error) {
       no_half_ = error.what();
     }
+    with_moments_ = have_moments(body);
     for (const double thickness : {kThinWall, kFewCells}) found_[thickness] = thin(thickness);
-    if (!no_half_.empty() || found_[kThinWall]) refinement_ = refinement_for_walls(body, quadratic);
+    if (found_[kThinWall]) refinement_ = refinement_for_walls(body, quadratic);
   }
 
   // The share of the matter in walls under so many cells, kThinWall or kFewCells, where it is too much for bars.
@@ -154,11 +155,20 @@ class Finest {
     return found != found_.end() ? found->second : thin_walls(body_, thickness, quadratic);
   }
   [[nodiscard]] double refinement() const {
-    return refinement_ ? *refinement_ : refinement_for_walls(body_, quadratic);
+    return found_.empty() ? refinement_for_walls(body_, quadratic) : refinement_;
   }
   [[nodiscard]] Finer as_finer() {
     if (found_.empty()) return finer(body_, quadratic);
     return {body_.parts, [this] { return half(); }, [this] { return thin(kThinWall).has_value(); }};
+  }
+  // `half`: what its coarsened() gave. Of pieces it has no moments, and is coarsened as one that has.
+  [[nodiscard]] Finer half_as_finer(const Body& half) const {
+    Finer made = finer(half, quadratic);
+    if (with_moments_)
+      made.coarsened = [&half] {
+        return coarsening(half, choose_grids(half, half.parts[0], face_pairs(half), true)).body;
+      };
+    return made;
   }
 
   const std::size_t cells;
@@ -174,7 +184,8 @@ class Finest {
 
   const Body& body_;
   std::map<double, std::optional<double>> found_;  // of a body in pieces, by thickness
-  std::optional<double> refinement_;               // likewise, where it may be asked for
+  bool with_moments_ = false;                      // likewise
+  double refinement_ = 2;                          // likewise
   Body half_;
   std::string no_half_;
 };
@@ -348,7 +359,7 @@ ErrorBars bars_beside(Finest& finest, const Scene& scene, const SimulateOptions&
   errors.cells.push_back(half.cell_count());
   bool wide = false;
   double least = kUnevenLeaves;  // of the value, of bars without an order
-  if (runs.add(finer(half, quadratic), quarter, reason)) {
+  if (runs.add(finest.half_as_finer(half), quarter, reason)) {
     errors.cells.push_back(quarter.cell_count());
     if (const std::optional<double> thin = finest.thin(kThinWall)) {
       wide = true;

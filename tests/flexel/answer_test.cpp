@@ -97,10 +97,11 @@ TEST(Answer, ABarLargerThanTheValueIsNoBound) {
 TEST(Answer, WhatTheLatticeDoesNotResolveIsSaidBesideTheBar) {
   Case made = with_bar(0.03);
   EXPECT_THAT(made.text(), Not(HasSubstr("not counted")));
-  made.body.notes["unresolved"] = "walls thinner than a cell (3 % of the places measured)\n";
+  made.body.notes["lost_walls"] = "walls of \"lever\" thinner than a cell (3 % of the places measured)\n";
   EXPECT_THAT(made.text(), HasSubstr("cells beside coarser ones; not counted: walls thinner than a cell (3 % "
                                      "of the places measured)\n"));
-  made.body.notes["unresolved"] += "pieces in 2 voxels taken as one\npieces in 3 voxels taken as one\n";
+  made.body.notes["joined_pieces"] =
+      "pieces of \"lever\" in 2 voxels taken as one\npieces of \"a\" in 3 voxels taken as one\n";
   EXPECT_THAT(made.text(), HasSubstr("measured), pieces in 2 voxels taken as one, and 1 more\n"));
 }
 

@@ -210,7 +210,12 @@ def test_what_no_bar_counts_is_said_beside_it():
         expect_ok(run("flexel-voxelize", f"{name}.stl", "--size", "1 mm", "-o", f"{name}.vtu"))
     scene("sheets.toml", 'material = "steel"\n[[fix]]\nwhere = "zmin"\n[[load]]\nwhere = "zmax"\nforce = ["0 N", "0 N", "-1 N"]\n')
     done = expect_ok(run("flexel-simulate", "sheets.toml", "one.vtu", "two.vtu", "-o", "o.vtu", "--summary", "s.json"))
-    expect(len(json.load(open("s.json", encoding="utf-8"))["unresolved"]) == 2, done.err)
+    with open("s.json", encoding="utf-8") as file:
+        told = json.load(file)["unresolved"]
+    expect(len(told) == 2 and told[0] != told[1], f"a line for each part: {told}")
+    expect_ok(run("flexel-voxelize", "lip.obj", "--size", "2.5 mm", "--moments", "-o", "b.vtu"))
+    scene("lip.toml", 'material = "PLA"\nmodel = "cells"\n[[fix]]\nwhere = "zmin"\n[[load]]\nwhere = "zmax"\nforce = ["0 N", "0 N", "-1 N"]\n')
+    expect("not counted: walls" in expect_ok(run("flexel-simulate", "lip.toml", "b.vtu", "-o", "o.vtu", "--force")).err, "with moments, too")
 
 
 def test_verbose_and_quiet():

@@ -233,14 +233,15 @@ def same_bars(a, b):
         close(x["values"], y["values"], 1e-5, "the largest stress of each lattice")
 
 
-def same_on_pieces(ranks, pieces, text, part="bar.stl", size="2.5 mm", shared=True, stress=True, bars=False):
+def same_on_pieces(ranks, pieces, text, part="bar.stl", size="2.5 mm", shared=True, stress=True, bars=False, moments=False):
     """A body in pieces of which no rank has the whole: the answer of flexel-simulate, in each piece, ghosts too."""
     import numpy
     need_mpi()
     scene(text=text)
     options = (*(() if bars else ("--no-estimate",)), *(() if stress else ("--no-stress",)))
-    expect_ok(run("flexel-voxelize", part, "--size", size, "-o", "whole.vtu"))
-    expect_ok(run("flexel-voxelize", part, "--size", size, "--pieces", pieces, "-o", "parts.pvtu"))
+    lattice = ("--size", size, *(("--moments",) if moments else ()))
+    expect_ok(run("flexel-voxelize", part, *lattice, "-o", "whole.vtu"))
+    expect_ok(run("flexel-voxelize", part, *lattice, "--pieces", pieces, "-o", "parts.pvtu"))
     expect_ok(run("flexel-simulate", "scene.toml", "whole.vtu", "-o", "one.vtu", "--summary", "one.json", "--threads", "1", *options))
     told = expect_ok(mpi(ranks, "scene.toml", "parts.pvtu", "-o", "all.pvtu", "--summary", "all.json", "--explain", "--force", *options))
     expect(("puts the body together" not in told.err) == shared, f"shared: {shared}: {told.err}")
@@ -354,6 +355,7 @@ tolerance = 1e-11
 def test_no_rank_has_the_whole_of_a_curved_part():
     same_on_pieces(2, 2, ARCH, part=arch(), size="1.7 mm", bars=True)
     same_on_pieces(3, 3, ARCH, part=arch(), size="1.1 mm", bars=True)
+    same_on_pieces(2, 2, 'model = "cells"\n' + ARCH, part=arch(), size="1.3 mm", bars=True, moments=True)
 
 
 def test_one_rank_puts_together_what_takes_the_whole():
