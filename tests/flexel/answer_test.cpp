@@ -86,7 +86,7 @@ TEST(Answer, TheBarDecidesTheWords) {
   EXPECT_THAT(guess, Not(HasSubstr("+-")));
 }
 
-// At 2.3 mm a bridge of 1 mm over a slot bends by 44 um +- 200 %, at .35 mm by 255 um.
+// tests/programs/accuracy_test.py has such a part.
 TEST(Answer, ABarLargerThanTheValueIsNoBound) {
   const std::string guess = with_bar(2.37).text();
   EXPECT_THAT(guess, HasSubstr("no more than a first guess: 1.7 mm, could be several times as much, at"));

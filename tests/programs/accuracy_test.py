@@ -196,6 +196,24 @@ def test_a_guess_is_called_one():
     expect("first guess" in answer["how far"] and sure.startswith("hardly"), said)
 
 
+def test_a_neck_narrower_than_a_cell_has_no_range():
+    """Two blocks that a bridge of 1 mm joins over a slot of .2 mm: smaller cells move three times as far, which no bar tells."""
+    profile = [(0, 0), (19.9, 0), (19.9, 9.5), (20.1, 9.5), (20.1, 0), (40, 0), (40, 20), (20.1, 20), (20.1, 10.5), (19.9, 10.5), (19.9, 20), (0, 20)]
+    count = len(profile)
+    vertices = "".join(f"v {x} {y} {z}\n" for z in (0, 4) for x, y in profile)
+    sides = "".join(f"f {i + 1} {(i + 1) % count + 1} {(i + 1) % count + count + 1} {i + count + 1}\n" for i in range(count))
+    ends = f"f {' '.join(str(i) for i in range(count, 0, -1))}\nf {' '.join(str(count + i + 1) for i in range(count))}\n"
+    write("slot.obj", vertices + sides + ends)
+    scene("slot.toml", 'material = "PLA"\n[[fix]]\nwhere = "xmin"\n[[load]]\nwhere = "xmax"\nforce = ["0 N", "1 N", "0 N"]\n')
+    for size, moved in (("2.3 mm", 44), ("0.5 mm", 128)):
+        expect_ok(run("flexel-voxelize", "slot.obj", "--size", size, "-o", "slot.vtu", "--force"))
+        said = expect_ok(run("flexel-simulate", "slot.toml", "slot.vtu", "-o", "o.vtu", "--summary", "s.json", "--force")).err
+        expect("could be several times as much" in said and "its error bar is larger than the value" in said, said)
+        with open("s.json", encoding="utf-8") as file:
+            found = 1e6 * json.load(file)["largest_displacement"]
+        expect(abs(found - moved) < 1, f"{size}: {found} um")
+
+
 def test_what_no_bar_counts_is_said_beside_it():
     """A fin of .5 mm in cells of 2.5 mm; model quadratic holds it. A body merged from files keeps what each says."""
     block_with_lip(0.5)
