@@ -426,6 +426,22 @@ ErrorBars bars_at_rest(Body& body, const Scene& scene, const SimulateOptions& op
   return estimate_errors(body, scene, options, result, solve, progress);
 }
 
+// Where time is up meanwhile the equilibrium is written as the last one is, and not lost. Of a body in pieces only the first process
+// knows of it.
+void judge(Body& body, const Scene& scene, const SimulateOptions& options, Progress& progress,
+           SimulateResult& result) {
+  try {
+    result.error_bars = bars_at_rest(body, scene, options, result, progress);
+    check_stop();
+  } catch (const TimeoutError& error) {
+    if (options.failed_output.empty() || other_pieces()) throw;
+    const StopWaits saving;
+    write_body(body, options.failed_output);
+    throw TimeoutError(
+        fmt::format("{} in the error bars; the equilibrium is in {}", error.what(), options.failed_output));
+  }
+}
+
 // What the closer look found is the largest stress, with its own bar.
 void prefer_local_stress(bool estimate, SimulateResult& result) {
   if (!result.local_stress) return;
@@ -446,7 +462,7 @@ SimulateResult run_and_judge(Body& body, const Scene& scene, const SimulateOptio
   SimulateResult result = run_at_rest(body, scene, options, progress, &linear_reach);
   if (options.estimate) {
     progress.stage("error bars");
-    result.error_bars = bars_at_rest(body, scene, options, result, progress);
+    judge(body, scene, options, progress, result);
   }
   prefer_local_stress(options.estimate, result);
   if (const std::string told = near_buckling(linear_reach, result); !told.empty())

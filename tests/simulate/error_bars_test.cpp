@@ -5,11 +5,19 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <numbers>
+#include <optional>
 
+#include "base/error.h"
+#include "base/stop.h"
+#include "formats/lattice/body_file.h"
+#include "formats/lattice/fields.h"
+#include "simulate/equilibrium/equilibrium.h"
 #include "simulate/estimate/stress_singularity.h"
 #include "simulate/result/estimate.h"
 #include "tests/sanitized.h"
+#include "tests/scratch.h"
 #include "tests/simulate/study_beam.h"
 
 namespace flexel::simulate {
@@ -195,6 +203,34 @@ TEST(ErrorBars, SayWhyThereAreNone) {
   const SimulateResult coarse = end_loaded(beam, testing::held_beam("cells"));
   EXPECT_EQ(coarse.error_bars.bars.size(), 3u);
   EXPECT_THAT(coarse.error_bars.note, HasSubstr("four times as coarse"));
+}
+
+TEST(ErrorBars, ATimeLimitInThemLosesNoEquilibrium) {
+  Body beam = testing::corner_beam(4);
+  Scene scene = testing::held_beam("cells");
+  scene.get<Loads>().loads.push_back(make_push(select_by_name("box/x1"), Vec3(0, 0, 1)));
+  std::optional<StopAfter> limit;
+  int searches = 0;
+  LoadStepHooks hooks;
+  hooks.make_solver = [&](Mechanics&) {
+    if (++searches == 2) limit.emplace(0, "--timeout");  // on the lattice twice as coarse
+    return LoadStepSolver();
+  };
+  SimulateOptions options;
+  options.hooks = std::make_shared<const LoadStepHooks>(hooks);
+  const flexel::test::Scratch scratch;
+  options.failed_output = scratch.path("failed.vtu");
+  Progress progress("test", Progress::Mode::quiet);
+  try {
+    (void)simulate(beam, scene, options, progress);
+    FAIL() << "no time limit";
+  } catch (const TimeoutError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("in the error bars; the equilibrium is in "));
+  }
+  limit.reset();
+  const Body kept = read_body(options.failed_output);
+  EXPECT_GT(largest_displacement(kept).value(), 1e-9);
+  EXPECT_EQ(kept.position, beam.position);
 }
 
 // By 16 % with two cells through it and with one.
