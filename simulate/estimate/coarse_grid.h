@@ -24,12 +24,11 @@ struct GridCut {
 };
 [[nodiscard]] GridCut cut(const CoarseGrid& grid, std::int32_t index);
 
-// By axis, of the whole body where it is in pieces, moved so that the first coarse plane at or below all cells has index 0. The pitch is 2 unless
+// By axis, moved so that the first coarse plane at or below all cells has index 0; of a body in pieces those of the whole. The pitch is 2 unless
 // another from 1.5 to 3 puts more flat faces of the part on planes; where the axis along which the part is
-// thinnest takes less, the others come near to that. Throws InputError: a part one cell thick. A body with moments
-// gets a pitch of 2 from a plane of its own everywhere: no cell is cut, for what of its moments lies on either side
-// of a cut is not known.
-// `doubled`: of such a body.
+// thinnest takes less, the others come near to that. Throws InputError: a part one cell thick. `doubled`, for a body with
+// moments: the pitch is 2 everywhere, from a plane of its own: no cell is cut, for what of its moments lies on either side of a cut is
+// not known.
 [[nodiscard]] std::array<CoarseGrid, 3> choose_grids(const Body& body, const Part& part,
                                                      const FacePairs& pairs, bool doubled);
 

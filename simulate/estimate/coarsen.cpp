@@ -274,25 +274,18 @@ Coarsening coarsen(const Body& body, const std::array<CoarseGrid, 3>* grids) {
       result.offsets.push_back(static_cast<std::uint32_t>(result.cells.size()));
     }
   }
-  coarse.position = coarse.rest;
-  coarse.broken.assign(coarse.cell_count(), 0);
-  coarse.surface = without_bytes(body.surface);
+  if (!body.surface_cell_offsets.empty()) coarse.surface_cell_offsets = {0};
   std::vector<std::uint32_t> under;
   for (std::size_t p = 0; p + 1 < body.surface_cell_offsets.size(); ++p) {
-    coarse.surface_cell_offsets.push_back(static_cast<std::uint32_t>(coarse.surface_cells.size()));
     under.clear();
     for (std::uint32_t at = body.surface_cell_offsets[p]; at < body.surface_cell_offsets[p + 1]; ++at) {
       const std::uint32_t cell = body.surface_cells[at];
       under.insert(under.end(), result.cells.begin() + result.offsets[cell],
                    result.cells.begin() + result.offsets[cell + 1]);
     }
-    std::sort(under.begin(), under.end());
-    under.erase(std::unique(under.begin(), under.end()), under.end());
-    coarse.surface_cells.insert(coarse.surface_cells.end(), under.begin(), under.end());
+    append_cells_under(under, coarse);
   }
-  if (!body.surface_cell_offsets.empty())
-    coarse.surface_cell_offsets.push_back(static_cast<std::uint32_t>(coarse.surface_cells.size()));
-  derive_connections(coarse);
+  complete_at_rest(body.surface, coarse);
   return result;
 }
 
@@ -314,15 +307,23 @@ void refuse_to_coarsen(const Body& body) {
   }
 }
 
-Surface without_bytes(const Surface& surface) {
-  Surface copy;
-  copy.vertices = surface.vertices;
-  copy.polygon_offsets = surface.polygon_offsets;
-  copy.polygon_vertices = surface.polygon_vertices;
-  copy.polygon_face = surface.polygon_face;
-  copy.faces = surface.faces;
-  copy.parts = surface.parts;
-  return copy;
+void append_cells_under(std::vector<std::uint32_t>& under, Body& coarse) {
+  std::sort(under.begin(), under.end());
+  under.erase(std::unique(under.begin(), under.end()), under.end());
+  coarse.surface_cells.insert(coarse.surface_cells.end(), under.begin(), under.end());
+  coarse.surface_cell_offsets.push_back(static_cast<std::uint32_t>(coarse.surface_cells.size()));
+}
+
+void complete_at_rest(const Surface& surface, Body& coarse) {
+  coarse.position = coarse.rest;
+  coarse.broken.assign(coarse.cell_count(), 0);
+  coarse.surface.vertices = surface.vertices;
+  coarse.surface.polygon_offsets = surface.polygon_offsets;
+  coarse.surface.polygon_vertices = surface.polygon_vertices;
+  coarse.surface.polygon_face = surface.polygon_face;
+  coarse.surface.faces = surface.faces;
+  coarse.surface.parts = surface.parts;
+  derive_connections(coarse);
 }
 
 Coarsening coarsening(const Body& body) {

@@ -30,8 +30,11 @@ struct Coarsening {
 [[nodiscard]] Coarsening coarsening(const Body& body, const std::array<CoarseGrid, 3>& grids);
 // Throws where coarsened() does, but for a part one cell thick.
 void refuse_to_coarsen(const Body& body);
-// (surface) What of it a coarse body needs: all but the bytes of its source.
-[[nodiscard]] Surface without_bytes(const Surface& surface);
+// Appends the cells under the next polygon, which `under` may name in any order and twice.
+void append_cells_under(std::vector<std::uint32_t>& under, Body& coarse);
+// What a coarse body has besides parts, elements, cells and those under polygons: it is at rest and whole, on `surface` without the
+// bytes of its source.
+void complete_at_rest(const Surface& surface, Body& coarse);
 
 // (elements) m: how far the matter under each element of `fine` has moved on the coarse body, trilinear in
 // the coarse cell that holds the element; zero for elements of broken cells alone.

@@ -125,16 +125,13 @@ class Joint {
   // In the order of every body. `coarse` has its only part.
   void append_to(Body& coarse) {
     const std::vector<std::uint32_t> element = append_elements(coarse), cell = append_cells(coarse, element);
+    coarse.surface_cell_offsets = {0};
     std::vector<std::uint32_t> under;
     for (const std::vector<std::uint32_t>& each : surface_) {
-      coarse.surface_cell_offsets.push_back(static_cast<std::uint32_t>(coarse.surface_cells.size()));
       under.clear();
       for (const std::uint32_t c : each) under.push_back(cell[c]);
-      std::sort(under.begin(), under.end());
-      under.erase(std::unique(under.begin(), under.end()), under.end());
-      coarse.surface_cells.insert(coarse.surface_cells.end(), under.begin(), under.end());
+      append_cells_under(under, coarse);
     }
-    coarse.surface_cell_offsets.push_back(static_cast<std::uint32_t>(coarse.surface_cells.size()));
   }
 
  private:
@@ -278,10 +275,7 @@ Body coarsened_from_pieces(const Body& body) {
   coarse.parts[0].element_begin = coarse.parts[0].cell_begin = 0;
   coarse.parts[0].element_end = static_cast<std::uint32_t>(coarse.element_count());
   coarse.parts[0].cell_end = static_cast<std::uint32_t>(coarse.cell_count());
-  coarse.position = coarse.rest;
-  coarse.broken.assign(coarse.cell_count(), 0);
-  coarse.surface = without_bytes(body.surface);
-  derive_connections(coarse);
+  complete_at_rest(body.surface, coarse);
   return coarse;
 }
 
